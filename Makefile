@@ -1,0 +1,42 @@
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/ready
+
+.PHONY: help paper smoke test lint benchmark lock
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+paper: $(READY) ## run the paper's whole sweep and write its tables
+	$(BIN)/python experiments/run.py -m experiment=paper
+
+smoke: $(READY) ## run every study once, tiny, in seconds
+	$(BIN)/python experiments/run.py -m experiment=smoke
+
+test: $(READY) ## run the tests
+	$(BIN)/python -m pytest
+
+lint: $(READY) ## check style, formatting and types
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy mlci experiments
+
+benchmark: $(READY) ## time the main algorithms against floors of this machine
+	$(BIN)/python tests/benchmark.py
+
+lock: $(READY) ## write requirements.lock from pyproject.toml, at the newest versions
+	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
+		--all-extras --custom-compile-command "make lock" --output-file requirements.lock pyproject.toml
+
+# Packages without a wheel are built with the locked setuptools, which therefore comes first.
+# The stamp is written last: an installation that failed halfway is tried again.
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+		echo "mlci needs Python 3.11 or newer, and $(PYTHON) is not: try make PYTHON=python3.12" >&2; \
+		exit 1; }
+	$(PYTHON) -m venv .venv
+	sed -n '/^setuptools==/,/# via/p' requirements.lock > .venv/setuptools.lock
+	$(BIN)/python -m pip install --quiet --requirement .venv/setuptools.lock
+	$(BIN)/python -m pip install --quiet --no-build-isolation --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --no-build-isolation --no-deps --editable .
+	@touch $@

@@ -1,0 +1,77 @@
+"""What a person reads on the terminal: a line or a small table for each part of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from mlci.metrics import Diagnosis
+from mlci.spaces import StateSpace
+
+
+def words(name: str) -> str:
+    """A column's or dimension's name as a reader would write it."""
+    return name.replace("_", " ")
+
+
+def trial_line(counts: Mapping[str, int]) -> str:
+    """How many demonstrations were kept, and why the others were not."""
+    rejected = ", ".join(f"{n} {words(kind)}" for kind, n in counts.items() if kind != "kept")
+    return f"demonstrations  {counts['kept']} of {sum(counts.values())} kept ({rejected})"
+
+
+def diagnosis_lines(
+    diagnosis: Diagnosis, names: Sequence[str], unreachable: int, tasks: int
+) -> Iterator[str]:
+    """How the discretisation moves, and a warning for each thing that is wrong with it."""
+    frozen = ", ".join(
+        f"{words(name)} {share:.0%}" for share, name in zip(diagnosis.frozen, names, strict=True)
+    )
+    yield (
+        f"discretisation  {diagnosis.stay:.0%} of moves stay in their cell, {diagnosis.leave:.0%} "
+        f"leave the state space, {diagnosis.cells_crossed:.1f} cells crossed in a step"
+    )
+    yield f"                cells that no action changes: {frozen}"
+    yield f"                {unreachable} of {tasks} goals cannot be reached"
+    for concern in diagnosis.concerns(names, unreachable, tasks):
+        yield f"       warning  {concern}"
+
+
+def ranking_lines(hypotheses: pd.DataFrame, space: StateSpace, top: int) -> Iterator[str]:
+    """The most likely hypotheses, and how much is left for there being none."""
+    feasible = int(hypotheses["feasible"].sum())
+    yield (
+        f"hypotheses      {feasible} of {len(hypotheses)} feasible; probability that there is no "
+        f"constraint {1 - hypotheses['posterior'].sum():.2g}"
+    )
+    yield "          rank  gain [nat]  posterior  region"
+    best = hypotheses[hypotheses["feasible"]].sort_values(["rank", "hypothesis"]).head(top)
+    for _, row in best.iterrows():
+        sides = [
+            f"{words(name)} {row[f'lower_{name}']:.4g} to {row[f'upper_{name}']:.4g} {unit}"
+            for name, unit in zip(space.names, space.units, strict=True)
+            if np.isfinite(row[f"lower_{name}"])
+        ]
+        true = "  (truth)" if row.get("covered_by_truth", False) else ""
+        yield (
+            f"          {row['rank']:4g}  {row['gain']:10.3f}  {row['posterior']:9.2g}  "
+            f"{', '.join(sides)}{true}"
+        )
+
+
+def measure_lines(summary: Mapping[str, float], quantiles: pd.DataFrame, top: int) -> Iterator[str]:
+    """The study's three measures."""
+    yield (
+        f"measures        final-state error {summary['final_state_error']:.3f}; violation distance "
+        f"{summary['violation_distance']:.2f} each (floor {summary['violation_floor']:.2f}), "
+        f"{summary['violation_distance_pooled']:.2f} pooled"
+    )
+    sizes = quantiles["demonstrations"]
+    for _, row in quantiles[sizes.isin([1, 5, 9, sizes.max()])].iterrows():
+        yield (
+            f"                rank of the truth after {row['demonstrations']:.0f}: median "
+            f"{row['median']:g} (80 % between {row['q10']:g} and {row['q90']:g}), top {top} in "
+            f"{row[f'share_top_{top}']:.0%} of random subsets"
+        )

@@ -1,0 +1,142 @@
+"""One point of a study, from settings to tables: the walk of the paper's sections III to V."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+
+from experiments.console import diagnosis_lines, measure_lines, ranking_lines, trial_line
+from experiments.measures import rank_tables, ranking_table, truth_tables
+from experiments.settings import Settings
+from experiments.stages import demonstrations
+from experiments.store import Store
+from mlci.maxent import expected_violations, log_partition, sample_moves, violation_probabilities
+from mlci.mdp import action_grid, discretize, forbid, step_count
+from mlci.metrics import (
+    diagnose,
+    final_state_error,
+    violation_distance,
+)
+from mlci.simulate import rollout
+
+# Random streams beside those of the trials, whose keys have one entry: see sample_trials.
+_ROLLOUTS, _SUBSETS = 0, 1
+
+
+def run_point(
+    settings: Settings, store: Store, log: Callable[[str], None]
+) -> dict[str, pd.DataFrame]:
+    """Run one point.
+
+    Args:
+        settings: the point.
+        store: where shared stages are kept.
+        log: is told what was found, a line or more at a time.
+
+    Returns:
+        Tables by name: `trials`, a row a kept demonstration; `ranks`, a row a subset of
+        demonstrations; `rank_quantiles`, a row a number of demonstrations; `hypotheses`, a row a
+        hypothesis, ranked with all of them; `summary`, one row; and the TRUTH_TABLES `attempts`,
+        a row a start and goal pair, `paths`, and `dimensions` of the state.
+    """
+    trials = demonstrations(settings, store)
+    kept = trials.kept(settings.demonstrations.keep)
+    counts = trials.counts()
+    log(trial_line(counts))
+    if not len(kept):
+        raise RuntimeError(
+            "no demonstration was kept: see the reasons above; widen tasks, or allow more "
+            "demonstrations.iterations, restarts or goal_weight"
+        )
+
+    system, grid, dt = settings.model, settings.cells, settings.dt
+    actions = action_grid(system, list(settings.action_counts))
+    hypotheses, steps = settings.candidates, step_count(settings.horizon, dt)
+    regions, count = hypotheses.joined(settings.constraint), len(hypotheses)
+    mdp = discretize(
+        system, grid, actions, dt, regions, settings.transition.samples, settings.temperature
+    )
+    starts = [int(cell) for cell in grid.index(trials.starts[kept])]
+    goals = [grid.cells_in(trials.goal(trial)) for trial in kept]
+    phi, reachable = expected_violations(mdp, starts, goals, [steps] * len(kept))
+    phi = phi[:, :count]
+    diagnosis = diagnose(system, grid, actions, dt, mdp)
+    unreachable = int(np.sum(~reachable))
+    for line in diagnosis_lines(diagnosis, system.space.names, unreachable, len(kept)):
+        log(line)
+
+    # Under the truth: final-state error and violation distance.
+    constrained = forbid(mdp, np.arange(count, len(regions)))
+    phi_truth = np.zeros_like(phi)
+    error = np.full(len(kept), np.nan)
+    for j, trial in enumerate(kept):
+        log_z = log_partition(constrained, starts[j], goals[j], steps)
+        if log_z[0, starts[j]] == -np.inf:
+            continue
+        phi_truth[j] = violation_probabilities(constrained, log_z, starts[j])[:count]
+        rng = _stream(settings.seed, _ROLLOUTS, trial)
+        _, moves = sample_moves(constrained, log_z, starts[j], settings.rollouts, rng)
+        controls = actions[mdp.action[moves]]
+        substeps = int(np.ceil(dt / settings.demonstrations.dt - 1e-9))
+        final = rollout(system, trials.starts[trial], controls, dt, substeps)[:, -1]
+        error[j] = np.mean(final_state_error(system.space, final, trials.goal(trial)))
+    feasible = ~np.isnan(error)
+
+    violated = hypotheses.violated_by(trials.states[kept])
+    distance = violation_distance(phi_truth[feasible], violated[feasible])
+    each, floor = np.full((2, len(kept)), np.nan)
+    each[feasible], floor[feasible] = distance.each, distance.floor
+
+    tables = {
+        "trials": pd.DataFrame(
+            {
+                "trial": kept,
+                "reachable": reachable,
+                "feasible": feasible,
+                "final_state_error": error,
+                "violation_distance": each,
+                "violation_floor": floor,
+            }
+        ),
+        **rank_tables(settings, phi, violated, reachable, _stream(settings.seed, _SUBSETS, 0)),
+        "hypotheses": ranking_table(
+            hypotheses, phi[reachable], violated, settings.inference.prior
+        ).assign(covered_by_truth=hypotheses.inside(settings.constraint)),
+        **truth_tables(settings, trials, kept),
+        "summary": pd.DataFrame(
+            [
+                {
+                    "pairs": len(trials.outcome),
+                    **counts,
+                    "demonstrations": len(kept),
+                    "reachable": int(np.sum(reachable)),
+                    "feasible": int(np.sum(feasible)),
+                    "final_state_error": np.nanmean(error) if feasible.any() else np.nan,
+                    "violation_distance": np.mean(distance.each) if feasible.any() else np.nan,
+                    "violation_floor": np.mean(distance.floor) if feasible.any() else np.nan,
+                    "violation_distance_pooled": distance.pooled if feasible.any() else np.nan,
+                    "stay": diagnosis.stay,
+                    "leave": diagnosis.leave,
+                    "cells_crossed": diagnosis.cells_crossed,
+                    **{
+                        f"frozen_{name}": share
+                        for name, share in zip(system.space.names, diagnosis.frozen, strict=True)
+                    },
+                }
+            ]
+        ),
+    }
+    top = settings.ranks.top
+    for line in ranking_lines(tables["hypotheses"], system.space, top):
+        log(line)
+    summary = tables["summary"].iloc[0].to_dict()
+    for line in measure_lines(summary, tables["rank_quantiles"], top):
+        log(line)
+    return tables
+
+
+def _stream(seed: int, purpose: int, index: int) -> np.random.Generator:
+    """A generator of its own for one purpose and one trial."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(purpose, int(index))))

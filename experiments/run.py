@@ -1,0 +1,79 @@
+"""Run one point, or with -m a sweep of them: python experiments/run.py [-m] [key=value ...]"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import traceback
+
+import hydra
+from hydra.core.config_store import ConfigStore
+from hydra.core.hydra_config import HydraConfig
+from hydra.core.plugins import Plugins
+from omegaconf import DictConfig
+
+from experiments.config import ConfigError
+from experiments.errors import CONF, explain
+from experiments.launcher import PoolLauncher
+from experiments.planner import Planner, SweepFailed, quote_options
+from experiments.tables import CollateError
+from experiments.task import run_task
+
+DONE, FAILED, REFUSED, STOPPED = 0, 1, 2, 130
+
+
+def main() -> int:
+    """Run the command line's point or sweep.
+
+    Returns:
+        0 if all is done, 1 if a point failed, 2 if the config is wrong, 130 after Ctrl-C.
+    """
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises its errors, and they are worded here
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a clean stop, as after Ctrl-C
+    register_plugins()
+    sys.argv[1:] = map(quote_options, sys.argv[1:])
+    try:
+        hydra.main(config_path=str(CONF), config_name="config", version_base="1.3")(_run_once)()
+    except KeyboardInterrupt:
+        print("stopped; what has finished is kept: the same command runs the rest", file=sys.stderr)
+        return STOPPED
+    except (SweepFailed, CollateError) as error:
+        print(error, file=sys.stderr)
+        return FAILED
+    except Exception as error:
+        print(explain(error), file=sys.stderr)
+        return REFUSED
+    return DONE
+
+
+def register_plugins() -> None:
+    """Make the sweeper and the launcher known to Hydra, however the project is installed."""
+    # Hydra 1.3 accepts plugins of the package `hydra_plugins` only; 1.4 has no such rule.
+    Plugins.is_in_toplevel_plugins_module = staticmethod(lambda target: True)  # type: ignore[assignment, method-assign]
+    for group, name, plugin, settings in (
+        ("hydra/sweeper", "planner", Planner, {"params": None}),
+        ("hydra/launcher", "pool", PoolLauncher, {"workers": "${workers}"}),
+    ):
+        Plugins.instance().register(plugin)
+        target = f"{plugin.__module__}.{plugin.__name__}"
+        node = {"_target_": target, **settings}
+        ConfigStore.instance().store(group=group, name=name, node=node, provider="mlci")
+
+
+def _run_once(config: DictConfig) -> None:
+    """The single point, outside Hydra's own handling of errors."""
+    try:
+        if HydraConfig.get().sweeper.get("params"):
+            raise ConfigError("experiment: this one describes a sweep; add -m to run it")
+        run_task(config)
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        raise SystemExit(REFUSED) from None
+    except Exception:
+        traceback.print_exc()
+        raise SystemExit(FAILED) from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,213 @@
+"""What decides a point's result, as frozen dataclasses; conf/config.yaml explains every value."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mlci.constraints import ConstraintSet
+from mlci.grids import Grid
+from mlci.spaces import Box, StateSpace
+from mlci.systems import System
+
+
+@dataclass(frozen=True)
+class Region:
+    """A box of states; None leaves that dimension free, at both ends."""
+
+    lower: tuple[float | None, ...]
+    upper: tuple[float | None, ...]
+
+    def box(self) -> Box:
+        """The region with infinite sides where a dimension is free."""
+        return Box(
+            np.array([-np.inf if side is None else side for side in self.lower]),
+            np.array([np.inf if side is None else side for side in self.upper]),
+        )
+
+
+@dataclass(frozen=True)
+class SystemSettings:
+    """A subclass of mlci.systems.System by its dotted name, and its constructor's arguments."""
+
+    target: str
+    arguments: Mapping[str, Any]
+
+    def build(self) -> System:
+        """The system itself."""
+        return system_class(self.target)(**self.arguments)
+
+
+@dataclass(frozen=True)
+class TruthSettings:
+    """The true constraint: the union of its boxes."""
+
+    name: str
+    boxes: tuple[Region, ...]
+
+
+@dataclass(frozen=True)
+class GridSettings:
+    """The cells of the tabular model."""
+
+    shape: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class TransitionSettings:
+    """From how many points of a cell, along each dimension, its transitions start."""
+
+    samples: int
+
+
+@dataclass(frozen=True)
+class HypothesesSettings:
+    """Cells of a regular grid (None leaves a dimension free), then listed boxes."""
+
+    shape: tuple[int | None, ...] | None
+    boxes: tuple[Region, ...]
+
+    def regions(self, space: StateSpace) -> ConstraintSet:
+        """All hypotheses, in the order in which tables number them."""
+        boxes = [region.box() for region in self.boxes]
+        if self.shape is None:
+            return ConstraintSet.from_boxes(space, boxes)
+        cells = ConstraintSet.from_grid(space, self.shape)
+        return cells.joined(ConstraintSet.from_boxes(space, boxes)) if boxes else cells
+
+
+@dataclass(frozen=True)
+class DemonstrationSettings:
+    """How demonstrations are generated."""
+
+    pairs: int
+    keep: int
+    dt: float
+    goal_tolerance: float
+    restarts: int
+    iterations: int
+    goal_weight: float
+    hold: float
+
+
+@dataclass(frozen=True)
+class SafetySettings:
+    """The safe set's grid, and the filter's margin (None derives it) and blend width."""
+
+    shape: tuple[int, ...]
+    margin: float | None
+    width: float
+
+
+@dataclass(frozen=True)
+class InferenceSettings:
+    """`prior`: probability that there is no constraint."""
+
+    prior: float
+
+
+@dataclass(frozen=True)
+class RankSettings:
+    """Ranks of the truth over random subsets of 1 .. `demonstrations` demonstrations."""
+
+    demonstrations: int
+    subsets: int
+    top: int
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All that decides the result of one point, and nothing else."""
+
+    system: SystemSettings
+    tasks: Region
+    truth: TruthSettings
+    grid: GridSettings
+    dt: float
+    actions: int | tuple[int, ...]
+    transition: TransitionSettings
+    horizon: float
+    temperature: float
+    hypotheses: HypothesesSettings
+    demonstrations: DemonstrationSettings
+    safety: SafetySettings
+    inference: InferenceSettings
+    ranks: RankSettings
+    rollouts: int
+    seed: int
+
+    @cached_property
+    def model(self) -> System:
+        """The system, built."""
+        return self.system.build()
+
+    @cached_property
+    def cells(self) -> Grid:
+        """The grid of the tabular model."""
+        return Grid(self.model.space, self.grid.shape)
+
+    @cached_property
+    def constraint(self) -> ConstraintSet:
+        """The true constraint."""
+        return ConstraintSet.from_boxes(self.model.space, [box.box() for box in self.truth.boxes])
+
+    @cached_property
+    def candidates(self) -> ConstraintSet:
+        """The hypotheses."""
+        return self.hypotheses.regions(self.model.space)
+
+    @property
+    def steps(self) -> int:
+        """T, the transitions in a horizon."""
+        return round(self.horizon / self.dt)
+
+    @property
+    def action_counts(self) -> tuple[int, ...]:
+        """(m,) number of actions along each control."""
+        if isinstance(self.actions, int):
+            return (self.actions,) * self.model.control_box.dimension
+        return self.actions
+
+    @property
+    def columns(self) -> dict[str, str | int | float]:
+        """The values that open every row of this point's tables."""
+        actions = self.actions
+        return {
+            "truth": self.truth.name,
+            "cells": math.prod(self.grid.shape),
+            "actions": actions if isinstance(actions, int) else "x".join(map(str, actions)),
+            "dt": self.dt,
+            "samples": self.transition.samples,
+        }
+
+
+@dataclass(frozen=True)
+class StudySettings:
+    """Where and how points run: it changes no result, so it is no part of a point's identity."""
+
+    study: str
+    results: str | None
+    workers: int | None
+
+
+def system_class(target: str) -> type[System]:
+    """The concrete System that a dotted path names.
+
+    Raises:
+        ValueError: it cannot be imported, or is something else.
+    """
+    module_name, _, name = target.rpartition(".")
+    try:
+        found = getattr(importlib.import_module(module_name), name, None)
+    except (ImportError, ValueError):
+        raise ValueError(f"{target!r} cannot be imported") from None
+    if not (inspect.isclass(found) and issubclass(found, System)) or inspect.isabstract(found):
+        raise ValueError(f"{target!r} is not a subclass of mlci.systems.System")
+    return found

@@ -1,0 +1,205 @@
+"""Sets of regions of the state space: constraint hypotheses and the ground truth alike.
+
+A path violates a region when it meets the region's interior: to touch an edge is not to enter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from mlci.grids import Grid
+from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
+
+_CHORDS_AT_ONCE = 1 << 15  # bounds the memory of one crossing test to a few C x 32 KiB
+
+
+@dataclass(frozen=True, eq=False)
+class ConstraintSet:
+    """C boxes in a state space; they may overlap, and need not cover it.
+
+    Attributes:
+        space: the state space.
+        lower: (C, n) lower corners, -inf where a dimension is free.
+        upper: (C, n) upper corners, +inf where a dimension is free.
+
+    Raises:
+        ValueError: corners of the wrong shape, an empty box, a side with one infinite end.
+    """
+
+    space: StateSpace
+    lower: Floats
+    upper: Floats
+
+    def __post_init__(self) -> None:
+        lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
+        n = self.space.dimension
+        if lower.ndim != 2 or lower.shape != upper.shape or lower.shape[1] != n or not len(lower):
+            raise ValueError(
+                f"regions need corners of shape (C, {n}) with C >= 1, "
+                f"not {lower.shape} and {upper.shape}"
+            )
+        bad = ~np.all((lower < upper) & (np.isfinite(lower) == np.isfinite(upper)), axis=1)
+        if bad.any():
+            first = int(np.argmax(bad))
+            raise ValueError(
+                f"region {first} needs lower < upper and both ends finite or neither: "
+                f"{lower[first].tolist()} to {upper[first].tolist()}"
+            )
+        object.__setattr__(self, "lower", lower)
+        object.__setattr__(self, "upper", upper)
+
+    def __len__(self) -> int:
+        return len(self.lower)
+
+    @classmethod
+    def from_boxes(cls, space: StateSpace, boxes: Iterable[Box]) -> ConstraintSet:
+        """The regions listed, in their order."""
+        boxes = list(boxes)
+        return cls(
+            space, np.array([box.lower for box in boxes]), np.array([box.upper for box in boxes])
+        )
+
+    @classmethod
+    def from_grid(cls, space: StateSpace, shape: Sequence[int | None]) -> ConstraintSet:
+        """Equal cells over any subset of the dimensions: a None in `shape` leaves one free."""
+        grid = Grid(space, tuple(1 if count is None else count for count in shape))
+        lower, upper = grid.corners
+        free = np.array([count is None for count in shape])
+        return cls(space, np.where(free, -np.inf, lower), np.where(free, np.inf, upper))
+
+    def box(self, index: int) -> Box:
+        """Region `index` as a box."""
+        return Box(self.lower[index], self.upper[index])
+
+    def joined(self, other: ConstraintSet) -> ConstraintSet:
+        """These regions, then the other's."""
+        return ConstraintSet(
+            self.space,
+            np.concatenate([self.lower, other.lower]),
+            np.concatenate([self.upper, other.upper]),
+        )
+
+    def signed_distance(self, states: ArrayLike) -> Floats:
+        """dist_K of the union (...,) at states (..., n): below 0 inside some region."""
+        each = [self.space.signed_distance(states, self.box(i)) for i in range(len(self))]
+        return np.min(each, axis=0)
+
+    def inside(self, other: ConstraintSet) -> Bools:
+        """(C,) which regions lie entirely in one region of `other` (to 1e-9 of the bounds).
+
+        What a region holds beyond the bounds of the state space does not count.
+        """
+        widths, periodic = self.space.bounds.widths, self.space.periodic
+        slack = 1e-9 * widths
+        mine, theirs = self._within_bounds(), other._within_bounds()
+        covered = np.zeros(len(self), dtype=bool)
+        for lower, upper in zip(*theirs, strict=True):
+            ahead = mine[0] - lower
+            ahead -= np.where(periodic, np.floor((ahead + slack) / widths) * widths, 0.0)
+            fits = (ahead >= -slack) & (ahead + mine[1] - mine[0] <= upper - lower + slack)
+            all_round = periodic & (upper - lower >= widths - slack)
+            covered |= np.all(fits | all_round, axis=1)
+        return covered
+
+    def _within_bounds(self) -> tuple[Floats, Floats]:
+        """Finite corners (C, n): cut to the bounds, and to one period where a region goes round."""
+        bounds, periodic = self.space.bounds, self.space.periodic
+        lower = np.where(periodic, self.lower, np.maximum(self.lower, bounds.lower))
+        upper = np.where(periodic, self.upper, np.minimum(self.upper, bounds.upper))
+        all_round = periodic & (upper - lower >= bounds.widths)
+        return np.where(all_round, bounds.lower, lower), np.where(all_round, bounds.upper, upper)
+
+    def violated_by(self, paths: ArrayLike) -> Bools:
+        """D: which regions (..., C) a path (..., K+1, n) enters, tested on its whole polyline.
+
+        Consecutive samples are joined by a straight line, the short way round in periodic
+        dimensions, so the path need not be unwrapped. A path of one sample is a point.
+        """
+        paths = np.asarray(paths, dtype=float)
+        batch, n = paths.shape[:-2], self.space.dimension
+        if paths.shape[-2] == 1:
+            paths = np.repeat(paths, 2, axis=-2)
+        flat = paths.reshape(-1, *paths.shape[-2:])
+        starts = flat[:, :-1]
+        steps = self.space.difference(flat[:, 1:], starts)
+        owner = np.repeat(np.arange(len(flat)), starts.shape[1])
+        hits = self.crossings(starts.reshape(-1, n), steps.reshape(-1, n), owner, len(flat))
+        return np.asarray(hits.toarray()).reshape(*batch, len(self))
+
+    def crossings(
+        self, starts: Floats, steps: Floats, owner: Ints, owners: int
+    ) -> sparse.csr_matrix:
+        """Which regions straight chords cross, gathered by the path that each belongs to.
+
+        Args:
+            starts: (Q, n) first ends of the chords.
+            steps: (Q, n) displacements; below half a period in periodic dimensions.
+            owner: (Q,) the row of the result that a chord counts for.
+            owners: number of rows.
+
+        Returns:
+            (owners, C) sparse boolean matrix.
+        """
+        keys = [np.empty(0, dtype=np.int64)]
+        for first in range(0, len(starts), _CHORDS_AT_ONCE):
+            part = slice(first, first + _CHORDS_AT_ONCE)
+            chord, region = self._chord_hits(self.space.wrap(starts[part]), steps[part])
+            keys.append(np.unique(owner[part][chord] * len(self) + region))
+        rows, columns = np.divmod(np.unique(np.concatenate(keys)), len(self))
+        ones = np.ones(len(rows), dtype=bool)
+        return sparse.csr_matrix((ones, (rows, columns)), shape=(owners, len(self)))
+
+    def _chord_hits(self, starts: Floats, steps: Floats) -> tuple[Ints, Ints]:
+        """Pairs (chord, region) that meet; starts wrapped."""
+        region, lower, upper = self._images
+        low, high = np.minimum(starts, starts + steps), np.maximum(starts, starts + steps)
+        near = np.ones((len(region), len(starts)), dtype=bool)
+        for d in range(self.space.dimension):
+            # Few distinct sides make many boxes: test each side once, then spread the answer.
+            sides, which = np.unique(
+                np.stack([lower[:, d], upper[:, d]], axis=1), axis=0, return_inverse=True
+            )
+            overlap = (low[:, d] < sides[:, 1, None]) & (high[:, d] > sides[:, 0, None])
+            near &= overlap[which.ravel()]
+        image, chord = np.nonzero(near)
+        # Slabs: the chord is between the two sides of dimension d at times from enter to leave.
+        lower, upper, start, step = lower[image], upper[image], starts[chord], steps[chord]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            to_lower, to_upper = (lower - start) / step, (upper - start) / step
+        # A near chord is between the two sides at some time in (0, 1) in each dimension, and at
+        # all times where it stands still: it hits if it is between all of them at once.
+        still = step == 0
+        enter = np.where(still, -np.inf, np.minimum(to_lower, to_upper)).max(axis=1)
+        leave = np.where(still, np.inf, np.maximum(to_lower, to_upper)).min(axis=1)
+        hit = enter < leave
+        return chord[hit], region[image[hit]]
+
+    @cached_property
+    def _images(self) -> tuple[Ints, Floats, Floats]:
+        """The regions' copies, whole periods apart, that a wrapped chord can reach.
+
+        Returns their region numbers (I,) and corners (I, n).
+        """
+        region, lower, upper = np.arange(len(self)), self.lower.copy(), self.upper.copy()
+        for d in np.flatnonzero(self.space.periodic):
+            period = self.space.bounds.widths[d]
+            free = upper[:, d] - lower[:, d] >= period
+            lower[free, d], upper[free, d] = -np.inf, np.inf
+            # Chords start in the bounds and are at most half a period long.
+            chords_from = self.space.bounds.lower[d] - period / 2
+            chords_to = self.space.bounds.upper[d] + period / 2
+            first = np.where(free, 0.0, np.ceil((chords_from - upper[:, d]) / period))
+            last = np.where(free, 0.0, np.floor((chords_to - lower[:, d]) / period))
+            copies = []
+            for turns in np.arange(first.min(), last.max() + 1):
+                wanted = (first <= turns) & (turns <= last)
+                shift = np.where(np.arange(self.space.dimension) == d, turns * period, 0.0)
+                copies.append((region[wanted], lower[wanted] + shift, upper[wanted] + shift))
+            region, lower, upper = map(np.concatenate, zip(*copies, strict=True))
+        return region, lower, upper

@@ -1,0 +1,179 @@
+"""Regular grids of cells over a state space: MDP states, hypothesis cells and value functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mlci.spaces import Box, Floats, Ints, StateSpace
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Equal cells that cover a state space; cells are numbered in C order of their indices.
+
+    Attributes:
+        space: the state space that is covered.
+        shape: (n,) number of cells in each dimension.
+
+    Raises:
+        ValueError: a shape of the wrong length or with an entry below 1.
+    """
+
+    space: StateSpace
+    shape: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        shape = tuple(int(count) for count in self.shape)
+        if len(shape) != self.space.dimension or min(shape, default=0) < 1:
+            raise ValueError(
+                f"a grid over {self.space.names} needs {self.space.dimension} counts of at "
+                f"least 1, not {list(self.shape)}"
+            )
+        object.__setattr__(self, "shape", shape)
+
+    @property
+    def size(self) -> int:
+        """S, the number of cells."""
+        return int(np.prod(self.shape))
+
+    @cached_property
+    def widths(self) -> Floats:
+        """(n,) side lengths of a cell."""
+        return self.space.bounds.widths / self.shape
+
+    @cached_property
+    def axes(self) -> tuple[Floats, ...]:
+        """Cell centres along each dimension: n arrays of length shape[d]."""
+        lower = self.space.bounds.lower
+        return tuple(
+            lower[d] + (np.arange(count) + 0.5) * self.widths[d]
+            for d, count in enumerate(self.shape)
+        )
+
+    @cached_property
+    def centers(self) -> Floats:
+        """(S, n) centre x_s of every cell."""
+        return np.stack([axis.ravel() for axis in np.meshgrid(*self.axes, indexing="ij")], axis=-1)
+
+    @cached_property
+    def corners(self) -> tuple[Floats, Floats]:
+        """Lower and upper corner (S, n) of every cell; neighbours share theirs to the last bit."""
+        lower, place = (
+            self.space.bounds.lower,
+            np.indices(self.shape).reshape(len(self.shape), -1).T,
+        )
+        return lower + place * self.widths, lower + (place + 1) * self.widths
+
+    def index(self, states: ArrayLike) -> Ints:
+        """Number (...,) of the cell that holds each of states (..., n), or -1 outside.
+
+        Cells are half open; the upper bound of the space belongs to the last cell.
+        """
+        wrapped = self.space.wrap(states)
+        position = np.floor((wrapped - self.space.bounds.lower) / self.widths)
+        position = np.clip(np.nan_to_num(position), 0, np.array(self.shape) - 1).astype(np.int64)
+        number = np.ravel_multi_index(tuple(np.moveaxis(position, -1, 0)), self.shape)
+        return np.where(self.space.contains(wrapped), number, -1)
+
+    def points_inside(self, samples: int) -> Floats:
+        """(S, samples^n, n): the centres of a regular subdivision of every cell."""
+        ticks = (np.arange(samples) + 0.5) / samples - 0.5
+        offsets = np.stack(np.meshgrid(*[ticks] * len(self.shape), indexing="ij"), axis=-1)
+        return self.centers[:, None, :] + offsets.reshape(-1, len(self.shape)) * self.widths
+
+    def cells_in(self, region: Box) -> Ints:
+        """Numbers of the cells that stand for a region, sorted; empty if it is outside.
+
+        In each dimension these are the cells whose centre the region's side holds, or, where it
+        is narrower than that (a point, for one), the cell of its middle.
+        """
+        chosen = []
+        for d, axis in enumerate(self.axes):
+            if not np.isfinite(region.widths[d]):
+                chosen.append(np.arange(self.shape[d]))
+                continue
+            middle = self.space.bounds.lower.copy()
+            middle[d] = (region.lower[d] + region.upper[d]) / 2
+            probes = np.tile(middle, (len(axis), 1))
+            probes[:, d] = axis
+            inside = np.abs(self.space.difference(probes, middle)[:, d]) <= region.widths[d] / 2
+            if not inside.any():
+                cell = int(self.index(middle))
+                if cell < 0:
+                    return np.empty(0, dtype=np.int64)
+                inside[np.unravel_index(cell, self.shape)[d]] = True
+            chosen.append(np.flatnonzero(inside))
+        mesh = np.meshgrid(*chosen, indexing="ij")
+        return np.sort(np.ravel_multi_index([part.ravel() for part in mesh], self.shape))
+
+    def interpolate(self, values: Floats, states: ArrayLike) -> Floats:
+        """Multilinear interpolation of cell-centre values at states.
+
+        Args:
+            values: (S, ...) one entry a cell.
+            states: (..., n) states; those outside the bounds take the nearest bound's value.
+
+        Returns:
+            (..., *values.shape[1:]), linear between centres, extrapolated linearly over the half
+            cell between the outermost centres and the bounds.
+        """
+        corners, fraction = self._surround(values, states)
+        batch, n = fraction.shape[:-1], len(self.shape)
+        fraction = fraction.reshape(*batch, *(1,) * (values.ndim - 1), n)
+        for d in range(n):
+            corners = corners[0] + fraction[..., d] * (corners[1] - corners[0])
+        return corners
+
+    def slope(self, values: Floats, states: ArrayLike) -> Floats:
+        """Exact gradient (..., n) of `interpolate` for values (S,); 0 beyond the bounds."""
+        corners, fraction = self._surround(values, states)
+        slopes = []
+        for d in range(len(self.shape)):
+            part = corners
+            for axis in range(len(self.shape)):
+                rise = part[1] - part[0]
+                part = rise / self.widths[d] if axis == d else part[0] + fraction[..., axis] * rise
+            slopes.append(part)
+        states, bounds = np.asarray(states), self.space.bounds
+        within = (states >= bounds.lower) & (states <= bounds.upper) | self.space.periodic
+        return np.where(within, np.stack(slopes, axis=-1), 0.0)
+
+    def _surround(self, values: Floats, states: ArrayLike) -> tuple[Floats, Floats]:
+        """Values at the centres around states, and the place of the states among them.
+
+        Returns (2, ..., 2, *batch, ...) values, lower and upper centre along each dimension, and
+        how far (*batch, n) a state is above the lower centre, in cells.
+        """
+        outermost, lowest, strides = self._limits
+        position = (np.asarray(states) - self.space.bounds.lower) / self.widths - 0.5
+        position = np.minimum(np.maximum(position, outermost[0]), outermost[1])
+        low = np.minimum(np.maximum(np.floor(position), lowest[0]), lowest[1])
+        ends = np.stack([low, low + 1]).astype(np.int64) % self.shape * strides
+        n, batch = len(self.shape), low.shape[:-1]
+        node = np.zeros((), dtype=np.int64)
+        for d in range(n):
+            along = (2 if axis == d else 1 for axis in range(n))
+            node = node + ends[..., d].reshape(*along, *batch)
+        # A state that is not a number belongs to no cell: any will do, as its fraction is nan.
+        return values.take(node, axis=0, mode="clip"), position - low
+
+    @cached_property
+    def _limits(self) -> tuple[Floats, Floats, Ints]:
+        """Least and greatest position and lower neighbour (2, n), in cells, and strides (n,).
+
+        The limits are infinite where the grid wraps.
+        """
+        counts, one = np.array(self.shape), np.ones(len(self.shape))
+        outermost = np.stack([-0.5 * one, counts - 0.5])
+        lowest = np.stack([0.0 * one, np.maximum(counts - 2.0, 0.0)])
+        strides = np.append(np.cumprod(self.shape[::-1])[-2::-1], 1).astype(np.int64)
+        unlimited = np.array([[-np.inf], [np.inf]])
+        return (
+            np.where(self.space.periodic, unlimited, outermost),
+            np.where(self.space.periodic, unlimited, lowest),
+            strides,
+        )

@@ -1,0 +1,241 @@
+"""The tabular model of a continuous system (section IV) and its diagnosis.
+
+Two probabilistic models share these arrays, told apart by the number of start points a cell:
+
+* **Centre model** (one start point, the paper's). From cell s, action a leads to the one cell that
+  the flow from the centre x_s under u_a reaches after dt: the deterministic kernel (1).
+* **Cell-averaged model** (k^n start points). Before every step the position inside the cell is
+  drawn afresh, uniformly among the k^n centres of a regular subdivision. A trajectory is the
+  sequence of cells, actions and draws; its probability is proportional to e^R times that of its
+  draws, (1/k^n)^T, over all trajectories that end in the goal. So the draws are conditioned on the
+  goal as the actions are: it is (2) for the deterministic MDP whose choices are pairs of action and
+  start point, with a constant factor that cancels. It is not the causal-entropy policy of a
+  stochastic MDP, under which the demonstrator could not count on reaching any goal cell.
+
+Hence the second axis of the arrays is a *move*: an action from one start point, in the order
+move = action * k^n + start point. In the centre model a move is an action.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from mlci.constraints import ConstraintSet
+from mlci.grids import Grid
+from mlci.simulate import rollout
+from mlci.spaces import Bools, Floats, Ints
+from mlci.systems import System
+
+_CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the curve it stands for
+_MOVES_AT_ONCE = 1 << 17
+
+
+@dataclass(frozen=True, eq=False)
+class TabularMDP:
+    """A deterministic tabular MDP that knows which regions its moves cross.
+
+    Attributes:
+        successor: (S, M) cell after a move; -1 where it leaves the grid.
+        reward: (S, M) reward of a move, r dt / temperature [nat].
+        allowed: (S, M) whether a move may be taken.
+        crosses: (S * M, C) sparse boolean: row s * M + move, the regions its path enters.
+        action: (M,) index of the action that a move applies.
+
+    Raises:
+        ValueError: arrays whose shapes disagree, or an allowed move without a successor.
+    """
+
+    successor: Ints
+    reward: Floats
+    allowed: Bools
+    crosses: sparse.csr_matrix
+    action: Ints
+
+    def __post_init__(self) -> None:
+        shape = self.successor.shape
+        if not (
+            len(shape) == 2
+            and self.reward.shape == self.allowed.shape == shape
+            and self.action.shape == shape[1:]
+            and self.crosses.shape[0] == shape[0] * shape[1]
+        ):
+            raise ValueError(
+                f"successor {shape}, reward {self.reward.shape}, allowed {self.allowed.shape}, "
+                f"action {self.action.shape} and crosses {self.crosses.shape} do not agree"
+            )
+        if np.any(self.allowed & ((self.successor < 0) | (self.successor >= shape[0]))):
+            raise ValueError("a move that leads to no cell is marked as allowed")
+
+    @property
+    def states(self) -> int:
+        """S, the number of cells."""
+        return int(self.successor.shape[0])
+
+    @property
+    def moves(self) -> int:
+        """M, the number of moves of a cell."""
+        return int(self.successor.shape[1])
+
+    @cached_property
+    def by_successor(self) -> tuple[Ints, Ints, Bools]:
+        """Each cell's moves sorted by successor, so that those with the same one can be merged.
+
+        Returns (S, M) each: the moves in that order, their successors, and where a new
+        successor begins.
+        """
+        order = np.argsort(self.successor, axis=1, kind="stable")
+        successor = np.take_along_axis(self.successor, order, axis=1)
+        begins = np.ones(successor.shape, dtype=bool)
+        begins[:, 1:] = successor[:, 1:] != successor[:, :-1]
+        return order, np.maximum(successor, 0), begins
+
+    @cached_property
+    def crossing_pairs(self) -> tuple[Ints, Ints, Bools]:
+        """The P pairs of a cell and a region that at least one of the cell's moves crosses.
+
+        Returns the pairs' cells (P,) ascending, their regions (P,), and which moves cross (P, M).
+        """
+        row, region = self.crosses.nonzero()
+        state, move = np.divmod(row.astype(np.int64), self.moves)
+        pair, which = np.unique(state * self.crosses.shape[1] + region, return_inverse=True)
+        crossed = np.zeros((len(pair), self.moves), dtype=bool)
+        crossed[which, move] = True
+        return (*np.divmod(pair, self.crosses.shape[1]), crossed)
+
+
+def action_grid(system: System, counts: int | Sequence[int]) -> Floats:
+    """(A, m) actions evenly spaced over the control box, its ends included (section IV-B).
+
+    Args:
+        system: gives the control box.
+        counts: number of values of each control, or one number for all; a single value is the
+            middle of its range.
+
+    Raises:
+        ValueError: a count below 1, or a list of the wrong length.
+    """
+    box = system.control_box
+    each = [counts] * box.dimension if isinstance(counts, int) else list(counts)
+    if len(each) != box.dimension or min(each) < 1:
+        raise ValueError(f"{box.dimension} controls need as many counts of at least 1, not {each}")
+    ticks = [
+        np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2])
+        for low, high, count in zip(box.lower, box.upper, each, strict=True)
+    ]
+    return np.stack([part.ravel() for part in np.meshgrid(*ticks, indexing="ij")], axis=-1)
+
+
+def discretize(
+    system: System,
+    grid: Grid,
+    actions: ArrayLike,
+    dt: float,
+    regions: ConstraintSet,
+    samples: int = 1,
+    temperature: float = 1.0,
+) -> TabularMDP:
+    """Form the tabular MDP of a continuous system, equation (1) and section IV-C.
+
+    Each move follows the true dynamics for dt. It is not allowed where its path leaves the state
+    space, and it crosses every region that the path enters, ends included.
+
+    Args:
+        system: the dynamics and the running reward r.
+        grid: the cells.
+        actions: (A, m) controls, held for dt.
+        dt: time step [s].
+        regions: the C regions whose crossings are kept: hypotheses, truths, or both.
+        samples: k; the moves of an action start at k^n points of the cell. 1 is the centre model,
+            more the cell-averaged one (see the module's head).
+        temperature: divides the reward (2).
+    """
+    actions = np.asarray(actions, dtype=float)
+    starts = grid.points_inside(samples)
+    points = starts.shape[1]
+    moves = len(actions) * points
+    substeps = substep_count(system, grid, actions, dt)
+    parts = []
+    block = max(1, _MOVES_AT_ONCE // (moves * substeps))
+    for first in range(0, grid.size, block):
+        origin = starts[first : first + block, None, :, :]  # cell, action, start point, n
+        control = actions[None, :, None, :]
+        origin, control = (
+            np.broadcast_to(origin, (len(origin), len(actions), *origin.shape[2:])),
+            np.broadcast_to(control, (len(origin), len(actions), points, actions.shape[1])),
+        )
+        reward = system.running_reward(origin, control) * (dt / temperature)
+        origin = origin.reshape(-1, origin.shape[-1])
+        held = control.reshape(-1, 1, actions.shape[1])
+        path = rollout(system, origin, held, dt, substeps)
+        parts.append((*_follow(grid, regions, path), reward.reshape(-1)))
+    successor, crosses, reward = zip(*parts, strict=True)
+    cells = np.concatenate(successor).reshape(grid.size, moves)
+    return TabularMDP(
+        successor=cells,
+        reward=np.concatenate(reward).reshape(grid.size, moves),
+        allowed=cells >= 0,
+        crosses=sparse.vstack(crosses, format="csr"),
+        action=np.repeat(np.arange(len(actions)), points),
+    )
+
+
+def forbid(mdp: TabularMDP, regions: ArrayLike) -> TabularMDP:
+    """The MDP under constraints, equation (3): moves that cross any of `regions` are not allowed.
+
+    Args:
+        mdp: the MDP.
+        regions: indices of columns of `mdp.crosses`.
+    """
+    columns = np.atleast_1d(np.asarray(regions, dtype=np.int64))
+    crossed = np.asarray(mdp.crosses[:, columns].sum(axis=1)).reshape(mdp.successor.shape) > 0
+    return replace(mdp, allowed=mdp.allowed & ~crossed)
+
+
+def step_count(horizon: float, dt: float) -> int:
+    """T = horizon / dt, the number of transitions.
+
+    Raises:
+        ValueError: dt does not divide the horizon (to 1e-9 of a step).
+    """
+    steps = round(horizon / dt)
+    if steps < 1 or abs(steps * dt - horizon) > 1e-9 * dt:
+        raise ValueError(f"a time step of {dt} s does not divide the horizon of {horizon} s")
+    return steps
+
+
+def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int:
+    """Integrator steps a move, so that chords stay close to the curve they stand for.
+
+    A chord over time t strays |x''| t^2 / 8 from its curve, with x'' = dh/dx h under a held
+    control; and no chord may span a quarter of a period, for the short way round to be its own.
+    """
+    shortest = dt
+    for action in actions:
+        speed = system.dynamics(grid.centers, action[None, :])
+        by_state, _ = system.jacobians(grid.centers, action[None, :])
+        bend = np.max(np.abs(np.einsum("...ij,...j->...i", by_state, speed)), axis=0)
+        quarter = np.where(grid.space.periodic, grid.space.bounds.widths / 4, np.inf)
+        with np.errstate(divide="ignore"):
+            shortest = min(
+                shortest,
+                float(np.min(np.sqrt(8 * _CHORD_ERROR * grid.widths / bend))),
+                float(np.min(quarter / np.max(np.abs(speed), axis=0))),
+            )
+    return int(np.ceil(dt / shortest - 1e-9))
+
+
+def _follow(grid: Grid, regions: ConstraintSet, path: Floats) -> tuple[Ints, sparse.csr_matrix]:
+    """Successor (-1 where the path leaves the space) and crossings of paths (Q, K+1, n)."""
+    stays = np.all(grid.space.contains(path), axis=-1)
+    successor = np.full(len(path), -1, dtype=np.int64)
+    successor[stays] = grid.index(path[stays, -1])
+    chords = path[stays, :-1], np.diff(path[stays], axis=1)
+    owner = np.repeat(np.flatnonzero(stays), path.shape[1] - 1)
+    flat = [part.reshape(-1, path.shape[-1]) for part in chords]
+    return successor, regions.crossings(flat[0], flat[1], owner, len(path))

@@ -1,0 +1,148 @@
+"""The study's measures (section V): final-state error, violation distance, rank of the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mlci.grids import Grid
+from mlci.inference import log_likelihood_gain, rank_scores
+from mlci.mdp import TabularMDP
+from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
+from mlci.systems import System
+
+# A discretisation is questioned above these shares. On the pendulum the truth is found where the
+# frozen share is at most 0.1 and is not where it is 0.34 or more.
+_FROZEN, _UNREACHABLE, _LEAVE = 0.25, 0.05, 0.5
+
+
+def final_state_error(space: StateSpace, final: ArrayLike, goal: Box) -> Floats:
+    """Normalised distance (...,) of final states (..., n) to the goal, the measure of Fig. 3.
+
+    Each dimension's difference, the short way round, is divided by its range; then Euclidean.
+    """
+    return np.linalg.norm(space.excess(final, goal) / space.bounds.widths, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class ViolationDistance:
+    """Equation (11) for each demonstration alone and for all of them pooled.
+
+    Attributes:
+        each: (N,) sum_i |Phi_i - D_i|.
+        floor: (N,) sum_i 2 Phi_i (1 - Phi_i): what `each` is on average for demonstrations drawn
+            from the tabular model itself.
+        pooled: sum_i |mean Phi_i - mean D_i|, which does go to 0 for those.
+    """
+
+    each: Floats
+    floor: Floats
+    pooled: float
+
+
+def violation_distance(phi: ArrayLike, violated: ArrayLike) -> ViolationDistance:
+    """Equation (11): expected against observed violations.
+
+    Args:
+        phi: (N, C) violation probabilities under the true constraint.
+        violated: (N, C) what the demonstrations violate.
+    """
+    phi, observed = np.asarray(phi, dtype=float), np.asarray(violated, dtype=float)
+    return ViolationDistance(
+        each=np.sum(np.abs(phi - observed), axis=1),
+        floor=np.sum(2 * phi * (1 - phi), axis=1),
+        pooled=float(np.sum(np.abs(np.mean(phi, axis=0) - np.mean(observed, axis=0)))),
+    )
+
+
+def random_subsets(
+    population: int, largest: int, count: int, rng: np.random.Generator
+) -> list[Ints]:
+    """For each size 1 .. largest, `count` random subsets: arrays (count, size) of indices.
+
+    Nested: the subset of size k is the first k of a random order of all, so that a curve over
+    the sizes follows demonstrations as they arrive.
+    """
+    orders = np.stack([rng.permutation(population) for _ in range(count)])
+    return [orders[:, :size] for size in range(1, min(largest, population) + 1)]
+
+
+def truth_ranks(phi: ArrayLike, violated: ArrayLike, truth: Bools, subsets: Ints) -> Floats:
+    """Rank of the truth after the demonstrations of each subset, the measure of Fig. 5.
+
+    Args:
+        phi: (N, C) violation probabilities without a constraint, 0 in the row of a demonstration
+            that the tabular MDP cannot follow: it refutes hypotheses but supports none.
+        violated: (N, C) what the demonstrations violate.
+        truth: (C,) which hypotheses the true constraint covers; the best ranked one counts.
+        subsets: (B, k) indices of demonstrations.
+
+    Returns:
+        (B,) ranks from 1; ties share their mean rank.
+    """
+    gain = np.sum(log_likelihood_gain(phi)[subsets], axis=1)
+    feasible = ~np.any(np.asarray(violated, dtype=bool)[subsets], axis=1)
+    return np.asarray(np.min(rank_scores(gain, feasible)[:, truth], axis=1))
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """How well a grid and a time step suit a system, known before anything long runs.
+
+    Attributes:
+        stay: share of the moves that end in the cell they began in.
+        leave: share of the moves that leave the state space.
+        cells_crossed: mean number of cells that a move covers, in its fastest dimension.
+        frozen: for each dimension, the share of cells whose number in it no move changes.
+    """
+
+    stay: float
+    leave: float
+    cells_crossed: float
+    frozen: tuple[float, ...]
+
+    def concerns(self, names: Sequence[str], unreachable: int, tasks: int) -> list[str]:
+        """What is wrong with the discretisation and what to do about it; empty if nothing is.
+
+        Args:
+            names: (n,) the state's dimensions.
+            unreachable: tasks whose goal the tabular model cannot reach.
+            tasks: number of tasks.
+        """
+        found = [
+            f"in {share:.0%} of the cells no action changes the {name.replace('_', ' ')} cell "
+            "within a step, so the tabular agent hardly steers"
+            for share, name in zip(self.frozen, names, strict=True)
+            if share > _FROZEN
+        ]
+        if unreachable > _UNREACHABLE * tasks:
+            found.append(f"{unreachable} of {tasks} goals cannot be reached by the tabular agent")
+        if found:
+            found.append(
+                "remedy: a longer time step, more cells, or start points averaged over the cell "
+                "(transition.samples=3)"
+            )
+        if self.leave > _LEAVE:
+            found.append(
+                f"{self.leave:.0%} of the moves leave the state space: widen its bounds or take "
+                "a shorter time step"
+            )
+        return found
+
+
+def diagnose(system: System, grid: Grid, actions: Floats, dt: float, mdp: TabularMDP) -> Diagnosis:
+    """Measure how a discretisation moves; see `Diagnosis`."""
+    own = np.arange(grid.size)[:, None]
+    speed = np.abs(system.dynamics(grid.centers[:, None, :], actions[None, :, :]))
+    place = np.stack(np.unravel_index(np.maximum(mdp.successor, 0), grid.shape), axis=-1)
+    here = np.stack(np.unravel_index(own, grid.shape), axis=-1)
+    changes = np.any((place != here) & mdp.allowed[..., None], axis=1)
+    return Diagnosis(
+        stay=float(np.mean((mdp.successor == own)[mdp.allowed])),
+        leave=float(np.mean(~mdp.allowed)),
+        cells_crossed=float(np.mean(np.max(speed * dt / grid.widths, axis=-1))),
+        frozen=tuple(float(share) for share in np.mean(~changes, axis=0)),
+    )

@@ -1,0 +1,132 @@
+"""Continuous control systems x' = h(x, u): the state space, the control box and the reward."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mlci.spaces import Box, Floats, StateSpace
+
+
+class System(ABC):
+    """What the rest of the package needs to know about a system.
+
+    `control_box` is the range that the tabular actions and the safety control use. The
+    demonstrator is free to exceed it.
+    """
+
+    @property
+    @abstractmethod
+    def space(self) -> StateSpace:
+        """The state space, whose bounds the tabular model may not leave."""
+
+    @property
+    @abstractmethod
+    def control_box(self) -> Box:
+        """(m,) range of the controls."""
+
+    @abstractmethod
+    def dynamics(self, states: Floats, controls: Floats) -> Floats:
+        """h(x, u): states (..., n) and controls (..., m) to derivatives (..., n)."""
+
+    @abstractmethod
+    def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
+        """dh/dx (..., n, n) and dh/du (..., n, m)."""
+
+    def running_reward(self, states: Floats, controls: Floats) -> Floats:
+        """r(x, u) (...,) at temperature 1: minus the squared control, as in (8)."""
+        return -np.sum(np.square(controls), axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Pendulum(System):
+    """theta'' = g / l sin(theta) + u, equation (7); theta = 0 is upright.
+
+    Attributes:
+        speed_limit: bound on |theta'| [rad/s].
+        control_limit: bound on |u| [rad/s^2].
+        gravity: g [m/s^2].
+        length: l [m].
+    """
+
+    speed_limit: float = 6.0
+    control_limit: float = 2.0
+    gravity: float = 1.0
+    length: float = 1.0
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "speed_limit", "control_limit", "length")
+
+    @cached_property
+    def space(self) -> StateSpace:
+        bounds = Box(np.array([0.0, -self.speed_limit]), np.array([2 * np.pi, self.speed_limit]))
+        return StateSpace(
+            bounds, np.array([True, False]), ("angle", "angular_velocity"), ("rad", "rad/s")
+        )
+
+    @cached_property
+    def control_box(self) -> Box:
+        return Box(np.array([-self.control_limit]), np.array([self.control_limit]))
+
+    def dynamics(self, states: Floats, controls: Floats) -> Floats:
+        fall = self.gravity / self.length * np.sin(states[..., 0])
+        speed, acceleration = np.broadcast_arrays(states[..., 1], fall + controls[..., 0])
+        return np.stack([speed, acceleration], axis=-1)
+
+    def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
+        batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
+        by_state = np.zeros((*batch, 2, 2))
+        by_state[..., 0, 1] = 1.0
+        by_state[..., 1, 0] = self.gravity / self.length * np.cos(states[..., 0])
+        by_control = np.broadcast_to(np.array([[0.0], [1.0]]), (*batch, 2, 1))
+        return by_state, by_control
+
+
+@dataclass(frozen=True, eq=False)
+class DoubleIntegrator(System):
+    """x'' = u: a mass on a line, whose safe sets and optimal controls are known exactly.
+
+    Attributes:
+        position_limit: bound on |x| [m].
+        speed_limit: bound on |x'| [m/s].
+        control_limit: bound on |u| [m/s^2].
+    """
+
+    position_limit: float = 3.0
+    speed_limit: float = 3.0
+    control_limit: float = 1.0
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "position_limit", "speed_limit", "control_limit")
+
+    @cached_property
+    def space(self) -> StateSpace:
+        upper = np.array([self.position_limit, self.speed_limit])
+        return StateSpace(
+            Box(-upper, upper), np.array([False, False]), ("position", "velocity"), ("m", "m/s")
+        )
+
+    @cached_property
+    def control_box(self) -> Box:
+        return Box(np.array([-self.control_limit]), np.array([self.control_limit]))
+
+    def dynamics(self, states: Floats, controls: Floats) -> Floats:
+        speed, acceleration = np.broadcast_arrays(states[..., 1], controls[..., 0])
+        return np.stack([speed, acceleration], axis=-1)
+
+    def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
+        batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
+        by_state = np.broadcast_to(np.array([[0.0, 1.0], [0.0, 0.0]]), (*batch, 2, 2))
+        by_control = np.broadcast_to(np.array([[0.0], [1.0]]), (*batch, 2, 1))
+        return by_state, by_control
+
+
+def _require_positive(system: System, *names: str) -> None:
+    """Refuse a parameter that is not a positive finite number."""
+    for name in names:
+        value = getattr(system, name)
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{type(system).__name__}.{name} must be positive, not {value}")

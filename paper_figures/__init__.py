@@ -1,0 +1,1 @@
+"""Figures of tables: each module draws one, from data frames alone, and runs nothing."""

@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from mlci.simulate import euler_step, rk4_step, rollout
+from mlci.systems import Pendulum
+
+PENDULUM = Pendulum()
+START = np.array([1.0, -0.5])
+CONTROLS = np.array([[1.5], [-2.0], [0.3], [1.0]])
+HOLD = 0.5
+
+
+def reference(start: np.ndarray) -> np.ndarray:
+    """States (K+1, n) at the ends of the holds, by an adaptive method with tight tolerances."""
+    states = [start]
+    for control in CONTROLS:
+        path = solve_ivp(
+            lambda _, state, control=control: PENDULUM.dynamics(state, control),
+            (0.0, HOLD),
+            states[-1],
+            method="DOP853",
+            rtol=1e-13,
+            atol=1e-13,
+        )
+        states.append(path.y[:, -1])
+    return np.array(states)
+
+
+@pytest.mark.parametrize(
+    ("step", "order", "substeps"),
+    [(euler_step, 1, [64, 128, 256, 512]), (rk4_step, 4, [2, 4, 8, 16])],
+)
+def test_error_falls_with_the_integrators_order(step, order, substeps):
+    exact = reference(START)
+    errors = []
+    for count in substeps:
+        path = rollout(PENDULUM, START, CONTROLS, HOLD, substeps=count, step=step)
+        assert path.shape == (len(CONTROLS) * count + 1, 2)
+        errors.append(np.max(np.abs(path[::count] - exact)))
+    slope = -np.polyfit(np.log(substeps), np.log(errors), 1)[0]
+    assert slope == pytest.approx(order, abs=0.15)
+
+
+def test_the_paths_of_a_batch_are_those_of_its_members():
+    starts = START + np.random.default_rng(0).normal(size=(3, 1, 2))
+    controls = np.stack([CONTROLS, -CONTROLS])
+    paths = rollout(PENDULUM, starts, controls, HOLD, substeps=2)
+    assert paths.shape == (3, 2, 9, 2)
+    for i in range(3):
+        for j in range(2):
+            alone = rollout(PENDULUM, starts[i, 0], controls[j], HOLD, substeps=2)
+            np.testing.assert_allclose(paths[i, j], alone, atol=1e-14)
+
+
+def test_a_winding_path_is_not_wrapped():
+    path = rollout(PENDULUM, [0.0, 5.0], np.zeros((40, 1)), 0.1)
+    assert path[-1, 0] > 2 * np.pi
+    assert np.all(np.diff(path[:, 0]) > 0)
+
+
+def test_no_controls_make_a_path_of_one_state():
+    np.testing.assert_array_equal(rollout(PENDULUM, START, np.empty((0, 1)), HOLD), [START])

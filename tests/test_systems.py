@@ -1,0 +1,76 @@
+import numpy as np
+import pytest
+
+from mlci.simulate import rollout
+from mlci.systems import DoubleIntegrator, Pendulum
+
+SYSTEMS = [Pendulum(gravity=9.81, length=0.7), DoubleIntegrator()]
+
+
+@pytest.mark.parametrize("system", SYSTEMS, ids=lambda system: type(system).__name__)
+def test_jacobians_agree_with_central_differences(system):
+    rng = np.random.default_rng(0)
+    n, m = system.space.dimension, system.control_box.dimension
+    states, controls = rng.normal(size=(5, 1, n)), rng.normal(size=(3, m))
+    by_state, by_control = system.jacobians(states, controls)
+    assert by_state.shape == (5, 3, n, n)
+    assert by_control.shape == (5, 3, n, m)
+    step = 1e-5
+    for d, nudge in enumerate(step * np.eye(n)):
+        change = system.dynamics(states + nudge, controls) - system.dynamics(
+            states - nudge, controls
+        )
+        np.testing.assert_allclose(by_state[..., d], change / (2 * step), atol=1e-8)
+    for d, nudge in enumerate(step * np.eye(m)):
+        change = system.dynamics(states, controls + nudge) - system.dynamics(
+            states, controls - nudge
+        )
+        np.testing.assert_allclose(by_control[..., d], change / (2 * step), atol=1e-8)
+
+
+def test_a_free_pendulum_keeps_its_energy_and_falls_from_upright():
+    pendulum = Pendulum(gravity=3.0, length=0.5)
+    path = rollout(pendulum, [0.1, 0.0], np.zeros((200, 1)), 0.01)
+    energy = path[:, 1] ** 2 / 2 + 3.0 / 0.5 * np.cos(path[:, 0])
+    np.testing.assert_allclose(energy, energy[0], atol=1e-6)
+    assert path[-1, 0] > np.pi / 2
+
+
+def test_a_double_integrator_under_constant_control_follows_a_parabola():
+    path = rollout(DoubleIntegrator(), [0.3, -1.0], np.full((10, 1), 0.8), 0.1)
+    time = np.linspace(0, 1, 11)
+    expected = np.stack([0.3 - time + 0.4 * time**2, 0.8 * time - 1.0], axis=-1)
+    np.testing.assert_allclose(path, expected, atol=1e-12)
+
+
+def test_parameters_set_the_state_space_and_the_control_box():
+    pendulum = Pendulum(speed_limit=4.0, control_limit=1.5)
+    np.testing.assert_array_equal(pendulum.space.bounds.upper, [2 * np.pi, 4.0])
+    np.testing.assert_array_equal(pendulum.space.periodic, [True, False])
+    np.testing.assert_array_equal(pendulum.control_box.vertices(), [[-1.5], [1.5]])
+    mass = DoubleIntegrator(position_limit=5.0, speed_limit=2.0, control_limit=0.5)
+    np.testing.assert_array_equal(mass.space.bounds.vertices()[[0, 3]], [[-5, -2], [5, 2]])
+    np.testing.assert_array_equal(mass.control_box.vertices(), [[-0.5], [0.5]])
+
+
+def test_running_reward_is_minus_the_squared_control():
+    reward = Pendulum().running_reward(np.zeros((2, 2)), np.array([[3.0], [-0.5]]))
+    np.testing.assert_array_equal(reward, [-9.0, -0.25])
+
+
+@pytest.mark.parametrize(
+    ("make", "parameter"),
+    [
+        (Pendulum, "speed_limit"),
+        (Pendulum, "control_limit"),
+        (Pendulum, "length"),
+        (DoubleIntegrator, "position_limit"),
+        (DoubleIntegrator, "speed_limit"),
+        (DoubleIntegrator, "control_limit"),
+    ],
+)
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+def test_parameters_that_are_not_positive_are_refused(make, parameter, value):
+    message = rf"{make.__name__}\.{parameter} must be positive, not {value}"
+    with pytest.raises(ValueError, match=message):
+        make(**{parameter: value})
