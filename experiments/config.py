@@ -11,13 +11,22 @@ import inspect
 import math
 import re
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from experiments.schema import Problems, did_you_mean, field_keys, parse
-from experiments.settings import Region, Settings, StudySettings, SystemSettings, system_class
+from experiments.settings import (
+    ModelSettings,
+    RecordedSettings,
+    Region,
+    Settings,
+    StudySettings,
+    SystemSettings,
+    system_class,
+)
 from mlci.spaces import StateSpace
 
 _MOST_STEPS = 100_000
@@ -74,13 +83,43 @@ def read_config(tree: Mapping[str, Any]) -> tuple[Settings, StudySettings]:
     point = {k: tree[k] for k in tree if k in point_keys}
     settings = parse(Settings, point, "", problems, {SystemSettings: _parse_system})
     # Each group of checks relies on the one before.
-    for check in (_study_problems, _scalar_problems, _shape_problems, _model_problems):
-        if not problems:
-            for message in check(study if check is _study_problems else settings):
-                problems.add(message)
+    for check in (
+        lambda: _study_problems(study),
+        lambda: chain(_number_problems(settings), _count_problems(settings)),
+        lambda: chain(_shape_problems(settings), _truth_shape_problems(settings)),
+        lambda: _size_problems(settings),
+        lambda: _truth_problems(settings),
+    ):
+        _check(problems, check)
+    return settings, study
+
+
+def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
+    """Check a resolved config of experiments/infer.py.
+
+    Raises:
+        ConfigError: listing every problem found.
+    """
+    problems = Problems()
+    # A system's config also says how to make demonstrations of it, which is not needed here.
+    known = {key: tree[key] for key in tree if key not in ("tasks", "safety")}
+    settings = parse(RecordedSettings, known, "", problems, {SystemSettings: _parse_system})
+    for check in (
+        lambda: _number_problems(settings),
+        lambda: chain(_shape_problems(settings), _task_problems(settings)),
+        lambda: _size_problems(settings),
+    ):
+        _check(problems, check)
+    return settings
+
+
+def _check(problems: Problems, check: Callable[[], Iterable[str]]) -> None:
+    """Raise what was found so far, or what one more check finds."""
+    if not problems:
+        for message in check():
+            problems.add(message)
     if problems:
         raise ConfigError("\n".join(problems.messages))
-    return settings, study
 
 
 def known_keys() -> list[str]:
@@ -133,7 +172,7 @@ def _study_problems(study: StudySettings) -> Iterator[str]:
         yield f"workers: {study.workers} must be at least 1; null takes one process a core"
 
 
-def _scalar_problems(settings: Settings) -> Iterator[str]:
+def _number_problems(settings: ModelSettings) -> Iterator[str]:
     """What is out of range without looking at the system."""
     yield from _limit(settings, _POSITIVE, lambda value: value > 0, "must be above 0")
     yield from _limit(settings, _NOT_NEGATIVE, lambda value: value >= 0, "must not be below 0")
@@ -143,6 +182,10 @@ def _scalar_problems(settings: Settings) -> Iterator[str]:
     )
     if not 0 < settings.inference.prior < 1:
         yield f"inference.prior: {settings.inference.prior} must lie between 0 and 1, ends excluded"
+
+
+def _count_problems(settings: Settings) -> Iterator[str]:
+    """Numbers of a study that do not go together."""
     demonstrations = settings.demonstrations
     if demonstrations.keep > demonstrations.pairs:
         yield (
@@ -155,13 +198,13 @@ def _scalar_problems(settings: Settings) -> Iterator[str]:
 
 
 def _limit(
-    settings: Settings, keys: tuple[str, ...], holds: Callable[[Any], bool], rule: str
+    settings: ModelSettings, keys: tuple[str, ...], holds: Callable[[Any], bool], rule: str
 ) -> Iterator[str]:
     """A message for each key whose value, or an entry of it, breaks a rule."""
     for key in keys:
         value: Any = settings
         for part in key.split("."):
-            value = getattr(value, part)
+            value = getattr(value, part, None)  # not every kind of settings has every key
         if value == ():
             yield f"{key}: [] is empty; give a number for each dimension"
         entries = value if isinstance(value, tuple) else (value,)
@@ -187,27 +230,41 @@ def _is_short(value: float) -> bool:
     return math.isclose(float(f"{value:.4g}"), value, rel_tol=1e-12)
 
 
-def _shape_problems(settings: Settings) -> Iterator[str]:
+def _shape_problems(settings: ModelSettings) -> Iterator[str]:
     """What does not match the system's dimensions and bounds."""
     space, controls = settings.model.space, settings.model.control_box.dimension
     for key, shape in (
         ("grid.shape", settings.grid.shape),
-        ("safety.shape", settings.safety.shape),
         ("hypotheses.shape", settings.hypotheses.shape),
     ):
         if shape is not None:
             yield from _length_problems(key, shape, space)
     if not isinstance(settings.actions, int) and len(settings.actions) != controls:
         yield f"actions: {list(settings.actions)} must be one number, or a list of {controls}"
+    for i, region in enumerate(settings.hypotheses.boxes):
+        yield from _region_problems(f"hypotheses.boxes[{i}]", region, space)
+    if settings.hypotheses.shape is None and not settings.hypotheses.boxes:
+        yield "hypotheses: no shape and no boxes; give a shape, for a grid of cells, or boxes"
+
+
+def _truth_shape_problems(settings: Settings) -> Iterator[str]:
+    """What a study has of regions beside the hypotheses."""
+    space = settings.model.space
+    yield from _length_problems("safety.shape", settings.safety.shape, space)
     yield from _region_problems("tasks", settings.tasks, space)
     for i, region in enumerate(settings.truth.boxes):
         yield from _region_problems(f"truth.boxes[{i}]", region, space)
-    for i, region in enumerate(settings.hypotheses.boxes):
-        yield from _region_problems(f"hypotheses.boxes[{i}]", region, space)
     if not settings.truth.boxes:
         yield "truth.boxes: [] is empty; give at least one box, with lower and upper"
-    if settings.hypotheses.shape is None and not settings.hypotheses.boxes:
-        yield "hypotheses: no shape and no boxes; give a shape, for a grid of cells, or boxes"
+
+
+def _task_problems(settings: RecordedSettings) -> Iterator[str]:
+    """A start or goal that does not fit the state space."""
+    space = settings.model.space
+    if settings.start is not None:
+        yield from _length_problems("start", settings.start, space)
+    if settings.goal is not None:
+        yield from _region_problems("goal", settings.goal, space, point=True)
 
 
 def _length_problems(key: str, entries: tuple[Any, ...], space: StateSpace) -> Iterator[str]:
@@ -217,8 +274,10 @@ def _length_problems(key: str, entries: tuple[Any, ...], space: StateSpace) -> I
         yield f"{key}: {list(entries)} must have {space.dimension} entries, one each for {names}"
 
 
-def _region_problems(key: str, region: Region, space: StateSpace) -> Iterator[str]:
-    """A box must match the state space's dimensions, be ordered and lie inside the bounds."""
+def _region_problems(
+    key: str, region: Region, space: StateSpace, point: bool = False
+) -> Iterator[str]:
+    """A box must match the state space, be ordered and lie inside; some may be a `point`."""
     if len(region.lower) != space.dimension or len(region.upper) != space.dimension:
         yield from _length_problems(f"{key}.lower", region.lower, space)
         yield from _length_problems(f"{key}.upper", region.upper, space)
@@ -229,7 +288,7 @@ def _region_problems(key: str, region: Region, space: StateSpace) -> Iterator[st
             continue
         if low is None or high is None:
             yield f"{key}: {name} has one side only; give both ends, or null twice to leave it free"
-        elif low >= high:
+        elif low > high or (low == high and not point):
             yield f"{key}: {name} goes from {low} to {high}; lower must be below upper"
         elif space.periodic[d] and high - low > (last - first) * (1 + 1e-12):
             yield f"{key}: {name} from {low:.6g} to {high:.6g} is over a whole turn; use null twice"
@@ -240,21 +299,26 @@ def _region_problems(key: str, region: Region, space: StateSpace) -> Iterator[st
             )
 
 
-def _model_problems(settings: Settings) -> Iterator[str]:
-    """What is too large to hold, and a truth that no hypothesis stands for."""
+def _size_problems(settings: ModelSettings) -> Iterator[str]:
+    """What is too large to hold."""
     n = settings.model.space.dimension
     moves = math.prod(settings.action_counts) * settings.transition.samples**n
     hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
     hypotheses += len(settings.hypotheses.boxes)
     for key, size, what in (
         ("grid.shape", math.prod(settings.grid.shape) * moves, "transitions"),
-        ("safety.shape", math.prod(settings.safety.shape), "values"),
         ("hypotheses.shape", hypotheses * math.prod(settings.grid.shape), "probabilities"),
     ):
         if size > _MOST_ENTRIES:
             value = list(getattr(settings, key.split(".")[0]).shape or ())
             yield f"{key}: {value} makes {size:.2g} {what}, over {_MOST_ENTRIES:.0e}; use fewer"
             return
+
+
+def _truth_problems(settings: Settings) -> Iterator[str]:
+    """A value grid that is too large, and a truth that no hypothesis stands for."""
+    if math.prod(settings.safety.shape) > _MOST_ENTRIES:
+        yield f"safety.shape: {list(settings.safety.shape)} makes too many values; use fewer"
     if not np.any(settings.candidates.inside(settings.constraint)):
         yield (
             f"truth: {settings.truth.name} covers no hypothesis entirely, so none can be ranked as "

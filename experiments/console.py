@@ -61,7 +61,7 @@ def ranking_lines(hypotheses: pd.DataFrame, space: StateSpace, top: int) -> Iter
         )
 
 
-def measure_lines(summary: Mapping[str, float], quantiles: pd.DataFrame, top: int) -> Iterator[str]:
+def measure_lines(summary: pd.Series, quantiles: pd.DataFrame, top: int) -> Iterator[str]:
     """The study's three measures."""
     yield (
         f"measures        final-state error {summary['final_state_error']:.3f}; violation distance "

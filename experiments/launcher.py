@@ -23,6 +23,8 @@ from tqdm import tqdm
 from experiments.errors import job_names
 from experiments.task import plain_tree
 
+_BAR = "{percentage:3.0f}%|{bar}| {n}/{total} points, {elapsed} gone, {remaining} left{postfix}"
+
 
 class PoolLauncher(Launcher):
     """Worker processes on this machine.
@@ -84,7 +86,10 @@ def _collect(futures: dict[Future[Any], tuple[str, ...]]) -> dict[tuple[str, ...
     returns: dict[tuple[str, ...], JobReturn] = {}
     failures = 0
     terminal = sys.stderr.isatty()
-    with tqdm(total=len(futures), unit=" points", smoothing=0.1, disable=not terminal) as bar:
+    shape = (
+        "{percentage:3.0f}%|{bar}| {n}/{total} points, {elapsed} gone, {remaining} left{postfix}"
+    )
+    with tqdm(total=len(futures), bar_format=shape, disable=not terminal) as bar:
         for future in as_completed(futures):
             job = futures[future]
             error = future.exception()

@@ -10,7 +10,7 @@ from experiments.stages import TrialSet
 from mlci.constraints import ConstraintSet
 from mlci.inference import confidence, rank_constraints
 from mlci.metrics import random_subsets, truth_ranks
-from mlci.spaces import Bools, Floats, Ints
+from mlci.spaces import Bools, Floats, Ints, StateSpace
 
 # They depend on the truth alone, open with its name only, and collate keeps one copy of each.
 TRUTH_TABLES = ("attempts", "dimensions", "paths")
@@ -106,13 +106,18 @@ def truth_tables(settings: Settings, trials: TrialSet, kept: Ints) -> dict[str, 
                 **{name: sampled[..., d].ravel() for d, name in enumerate(space.names)},
             }
         ),
-        "dimensions": pd.DataFrame(
-            {
-                "name": space.names,
-                "unit": space.units,
-                "lower": space.bounds.lower,
-                "upper": space.bounds.upper,
-                "periodic": space.periodic,
-            }
-        ),
+        "dimensions": dimension_table(space),
     }
+
+
+def dimension_table(space: StateSpace) -> pd.DataFrame:
+    """A row a dimension of the state: what figures need to know of it."""
+    return pd.DataFrame(
+        {
+            "name": space.names,
+            "unit": space.units,
+            "lower": space.bounds.lower,
+            "upper": space.bounds.upper,
+            "periodic": space.periodic,
+        }
+    )

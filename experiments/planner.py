@@ -93,7 +93,7 @@ class Planner(Sweeper):
         points: dict[str, tuple[tuple[str, ...], Point]] = {}
         trees: dict[tuple[str, ...], dict[str, Any]] = {}
         problems: dict[str, list[str]] = {}
-        bar = tqdm(jobs, desc="checking", unit=" points", leave=False, disable=None)
+        bar = tqdm(jobs, desc="checking points", unit="point", leave=False, disable=None)
         for job, name in zip(bar, job_names(jobs), strict=True):
             try:
                 tree = plain_tree(self._loader.load_sweep_config(self._base, list(job)))

@@ -131,7 +131,7 @@ def run_point(
     top = settings.ranks.top
     for line in ranking_lines(tables["hypotheses"], system.space, top):
         log(line)
-    summary = tables["summary"].iloc[0].to_dict()
+    summary = tables["summary"].iloc[0]
     for line in measure_lines(summary, tables["rank_quantiles"], top):
         log(line)
     return tables

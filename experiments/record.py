@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 from experiments import point
-from experiments.measures import TRUTH_TABLES
 from experiments.schema import plain
 from experiments.settings import Settings
 from experiments.store import Store, canonical_json, digest, replace_file, source_hash
@@ -99,10 +98,7 @@ class Point:
             replace_file(self.folder / "log.txt", text.encode())
         files = {"log.txt": digest(text.encode())}
         for name, frame in sorted(tables.items()):
-            columns = self.settings.columns
-            if name in TRUTH_TABLES:
-                columns = {"truth": columns["truth"]}
-            data = table_bytes(frame, columns)
+            data = table_bytes(name, frame, self.settings)
             files[f"{name}.csv"] = digest(data)
             replace_file(self.folder / f"{name}.csv", data)
         record = {
@@ -116,16 +112,23 @@ class Point:
             "started": started,
             # Of the process, which may have run other points before this one.
             "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
-            "git": git_state(),
-            "host": socket.gethostname(),
-            "system": platform.platform(),
-            "cores": os.cpu_count(),
-            "blas_threads": os.environ.get("OMP_NUM_THREADS"),
-            "python": sys.version.split()[0],
-            "packages": _versions(),
+            **surroundings(),
         }
         data = json.dumps(record, indent=1, allow_nan=False).encode() + b"\n"
         replace_file(self.folder / "record.json", data)
+
+
+def surroundings() -> dict[str, Any]:
+    """The code, the packages and the machine that a result comes from."""
+    return {
+        "git": git_state(),
+        "host": socket.gethostname(),
+        "system": platform.platform(),
+        "cores": os.cpu_count(),
+        "blas_threads": os.environ.get("OMP_NUM_THREADS"),
+        "python": sys.version.split()[0],
+        "packages": _versions(),
+    }
 
 
 @cache

@@ -123,25 +123,17 @@ class RankSettings:
 
 
 @dataclass(frozen=True)
-class Settings:
-    """All that decides the result of one point, and nothing else."""
+class ModelSettings:
+    """The tabular model of a system and the hypotheses about it."""
 
     system: SystemSettings
-    tasks: Region
-    truth: TruthSettings
     grid: GridSettings
     dt: float
     actions: int | tuple[int, ...]
     transition: TransitionSettings
-    horizon: float
     temperature: float
     hypotheses: HypothesesSettings
-    demonstrations: DemonstrationSettings
-    safety: SafetySettings
     inference: InferenceSettings
-    ranks: RankSettings
-    rollouts: int
-    seed: int
 
     @cached_property
     def model(self) -> System:
@@ -154,19 +146,9 @@ class Settings:
         return Grid(self.model.space, self.grid.shape)
 
     @cached_property
-    def constraint(self) -> ConstraintSet:
-        """The true constraint."""
-        return ConstraintSet.from_boxes(self.model.space, [box.box() for box in self.truth.boxes])
-
-    @cached_property
     def candidates(self) -> ConstraintSet:
         """The hypotheses."""
         return self.hypotheses.regions(self.model.space)
-
-    @property
-    def steps(self) -> int:
-        """T, the transitions in a horizon."""
-        return round(self.horizon / self.dt)
 
     @property
     def action_counts(self) -> tuple[int, ...]:
@@ -174,6 +156,25 @@ class Settings:
         if isinstance(self.actions, int):
             return (self.actions,) * self.model.control_box.dimension
         return self.actions
+
+
+@dataclass(frozen=True)
+class Settings(ModelSettings):
+    """All that decides the result of one point, and nothing else."""
+
+    tasks: Region
+    truth: TruthSettings
+    horizon: float
+    demonstrations: DemonstrationSettings
+    safety: SafetySettings
+    ranks: RankSettings
+    rollouts: int
+    seed: int
+
+    @cached_property
+    def constraint(self) -> ConstraintSet:
+        """The true constraint."""
+        return ConstraintSet.from_boxes(self.model.space, [box.box() for box in self.truth.boxes])
 
     @property
     def columns(self) -> dict[str, str | int | float]:
@@ -186,6 +187,19 @@ class Settings:
             "dt": self.dt,
             "samples": self.transition.samples,
         }
+
+
+@dataclass(frozen=True)
+class RecordedSettings(ModelSettings):
+    """Inference from recorded demonstrations; conf/infer.yaml explains every value."""
+
+    demonstrations: str | tuple[str, ...]
+    recorded_dt: float
+    start: tuple[float, ...] | None
+    goal: Region | None
+    round_horizon: bool
+    top: int
+    results: str | None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import pandas as pd
 
 from experiments.measures import TRUTH_TABLES
 from experiments.schema import plain
+from experiments.settings import Settings
 from experiments.store import digest, replace_file
 
 if TYPE_CHECKING:
@@ -26,13 +27,25 @@ class CollateError(Exception):
     """Points that cannot stand in one table; the message names them."""
 
 
-def table_bytes(frame: pd.DataFrame, columns: Mapping[str, Any]) -> bytes:
+def opening_columns(measure: str, settings: Settings) -> dict[str, str | int | float]:
+    """The values that open every row of a point's table."""
+    columns = settings.columns
+    return {"truth": columns["truth"]} if measure in TRUTH_TABLES else columns
+
+
+def table_bytes(measure: str, frame: pd.DataFrame, settings: Settings) -> bytes:
     """A point's table as CSV, every row opened by the point's own values, floats exact."""
+    columns = opening_columns(measure, settings)
     kept = [name for name in frame.columns if name not in columns]
     opened = frame[kept].copy()
     for place, (name, value) in enumerate(columns.items()):
         opened.insert(place, name, value)
-    text: str = opened.to_csv(index=False, lineterminator="\n")
+    return csv_bytes(opened)
+
+
+def csv_bytes(frame: pd.DataFrame) -> bytes:
+    """A table as CSV, floats exact."""
+    text: str = frame.to_csv(index=False, lineterminator="\n")
     return text.encode()
 
 
@@ -76,8 +89,15 @@ def collate(points: Sequence[Point], study: Path) -> list[Path]:
     names = sorted({name for record in records.values() for name in record["files"]} - {"log.txt"})
     written, digests = [], {}
     for name in names:
-        chosen = _distinct(ordered, records, name) if Path(name).stem in TRUTH_TABLES else ordered
-        data = _join(chosen, name, _extra_columns(chosen, flat), flat)
+        measure = Path(name).stem
+        same: dict[str, list[Point]] = {}
+        for point in ordered:
+            content = records[point.identity]["files"].get(name, "")
+            alike = content if measure in TRUTH_TABLES else point.identity
+            same.setdefault(alike, []).append(point)
+        groups = list(same.values())
+        extra = _extra_columns(groups, measure, flat)
+        data = _join([group[0] for group in groups], name, extra, flat)
         replace_file(study / "tables" / name, data)
         written.append(study / "tables" / name)
         digests[name] = digest(data)
@@ -112,16 +132,6 @@ def _join(
     return text.getvalue().encode()
 
 
-def _distinct(
-    ordered: Sequence[Point], records: Mapping[str, dict[str, Any]], name: str
-) -> list[Point]:
-    """The first of the points that have the same table, for each different one."""
-    first: dict[str, Point] = {}
-    for point in ordered:
-        first.setdefault(records[point.identity]["files"].get(name, ""), point)
-    return list(first.values())
-
-
 def _csv_row(values: Sequence[Any]) -> str:
     """Values as the start of a CSV line, up to and with the comma before the next."""
     if not values:
@@ -131,20 +141,30 @@ def _csv_row(values: Sequence[Any]) -> str:
     return text.getvalue()
 
 
-def _extra_columns(ordered: Sequence[Point], flat: Mapping[str, dict[str, Any]]) -> list[str]:
-    """Dotted keys, in order, that are needed to tell the points of a table apart."""
-    keys = dict.fromkeys(key for point in ordered for key in flat[point.identity])
-    known = {point.identity: tuple(point.settings.columns.values()) for point in ordered}
+def _extra_columns(
+    groups: Sequence[Sequence[Point]], measure: str, flat: Mapping[str, dict[str, Any]]
+) -> list[str]:
+    """Dotted keys, in order, that are needed to tell groups of points with equal rows apart."""
+
+    def varies(key: str, group: Sequence[Point]) -> bool:
+        return len({flat[point.identity].get(key) for point in group}) > 1
+
+    keys = dict.fromkeys(key for group in groups for key in flat[group[0].identity])
+    known: list[tuple[Any, ...]] = [
+        tuple(opening_columns(measure, group[0].settings).values()) for group in groups
+    ]
     extra = []
-    for key in keys:
-        # What is known of a point is enough if it has one value of `key` only.
-        told: dict[Any, set[Any]] = {}
-        for point in ordered:
-            value = flat[point.identity].get(key)
-            told.setdefault(known[point.identity], set()).add(value)
-        if any(len(values) > 1 for values in told.values()):
+    # A key that varies inside a group is no reason for its rows, unless there is no other.
+    for key in sorted(keys, key=lambda key: any(varies(key, group) for group in groups)):
+        told: dict[tuple[Any, ...], list[Point]] = {}
+        for values, group in zip(known, groups, strict=True):
+            told.setdefault(values, []).append(group[0])
+        if any(varies(key, alike) for alike in told.values()):
             extra.append(key)
-            known = {name: (*values, flat[name].get(key)) for name, values in known.items()}
+            known = [
+                (*values, flat[group[0].identity].get(key))
+                for values, group in zip(known, groups, strict=True)
+            ]
     return extra
 
 

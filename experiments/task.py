@@ -10,7 +10,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from experiments.config import ConfigError, read_config
 from experiments.record import CHECKOUT, Point
-from experiments.settings import StudySettings
+from experiments.settings import RecordedSettings, StudySettings
 
 
 def run_task(config: DictConfig) -> str:
@@ -48,6 +48,7 @@ def plain_tree(config: DictConfig) -> dict[str, Any]:
     return dict(resolved)
 
 
-def results_folder(study: StudySettings) -> Path:
+def results_folder(settings: StudySettings | RecordedSettings) -> Path:
     """Where results go: the checkout's own folder unless another is given."""
-    return CHECKOUT / "results" if study.results is None else Path(study.results).resolve()
+    given = settings.results
+    return CHECKOUT / "results" if given is None else Path(given).resolve()

@@ -167,7 +167,7 @@ def sample_trials(
     margin: float = 0.0,
     goal_offsets: Box | None = None,
     restarts: int = 3,
-    hold: float = 1.0,
+    hold: float = 0.5,
 ) -> list[Trial]:
     """Draw tasks, uniformly among safe starts and goals, and first guesses for them.
 

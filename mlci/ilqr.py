@@ -15,7 +15,7 @@ winding. Members never influence each other.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -99,24 +99,10 @@ class _Path:
     applied: Floats
     cost: Floats
 
-    def of(self, members: Ints | Bools) -> _Path:
-        """The paths of some members only."""
-        return _Path(
-            self.states[:, members],
-            self.wanted[:, members],
-            self.applied[:, members],
-            self.cost[members],
-        )
-
-    def pick(self, sizes: Ints) -> _Path:
-        """Of paths with an axis L before B, the one at index sizes[b] for each member b."""
-        each = np.arange(len(sizes))
-        return _Path(
-            self.states[:, sizes, each],
-            self.wanted[:, sizes, each],
-            self.applied[:, sizes, each],
-            self.cost[sizes, each],
-        )
+    def of(self, *index: Any) -> _Path:
+        """The paths at an index into the axes behind time."""
+        at = (slice(None), *index)
+        return _Path(self.states[at], self.wanted[at], self.applied[at], self.cost[index])
 
     def put(self, members: Ints, other: _Path) -> None:
         """Overwrite the paths of some members."""
@@ -161,10 +147,10 @@ def optimize(
     problem = _Problem(system, starts, goal_lower, goal_upper, dt, goal_weight, filter_)
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging candidate is not an error
         guess = np.moveaxis(controls, 1, 0)
-        unknown = _Path(np.zeros((len(guess) + 1, *starts.shape)), guess, guess, np.zeros(0))
+        zero = np.zeros((len(guess) + 1, *starts.shape))
+        around = _Path(zero, guess, guess, np.zeros(len(starts)))
         gain = np.zeros((*guess.shape, starts.shape[1]))
-        rolled = _roll_out(problem, unknown, np.zeros_like(guess), gain, _STEP_SIZES[:1])
-        path = rolled.pick(np.zeros(len(starts), dtype=np.int64))
+        path = _roll_out(problem, around, 0 * guess, gain, _STEP_SIZES[:1]).of(0)
         damping, change = np.full(len(starts), _FLOOR), np.ones(len(starts))
         active = np.isfinite(path.cost)
         costs = [path.cost.copy()]
@@ -214,7 +200,7 @@ def _improve(problem: _Problem, path: _Path, damping: Floats) -> tuple[_Path, Bo
     """One iteration: the best candidates, (B,) and which of them are cheaper than `path`."""
     shift, gain = _backward(problem, path, damping)
     candidates = _roll_out(problem, path, shift, gain, _STEP_SIZES)
-    chosen = candidates.pick(np.argmin(candidates.cost, axis=0))
+    chosen = candidates.of(np.argmin(candidates.cost, axis=0), np.arange(len(damping)))
     return chosen, np.asarray(chosen.cost < path.cost)
 
 
@@ -222,11 +208,11 @@ def _backward(problem: _Problem, path: _Path, damping: Floats) -> tuple[Floats, 
     """Riccati recursion along paths: shift (K, B, m) and gain (K, B, m, n) of the control.
 
     With z = (x, u): Q_zz = L_zz + F' V_xx F and Q_z = L_z + F' V_x, where F = [dx'/dx, dx'/du].
-    A member whose Q_uu is not positive definite gets no change, and so more damping next time.
+    Where they are not finite no candidate is better, and the member gets more damping.
     """
     system, dt = problem.system, problem.dt
     states, wanted, applied = path.states, path.wanted, path.applied
-    n, m = states.shape[-1], wanted.shape[-1]
+    n = states.shape[-1]
     by_state, by_control = problem.safety_filter.linearize(states[:-1], wanted)
     through = np.concatenate([by_state, by_control], axis=-1)  # dv/dz
     drift, push = system.jacobians(states[:-1], applied)
@@ -238,14 +224,12 @@ def _backward(problem: _Problem, path: _Path, damping: Floats) -> tuple[Floats, 
     excess, sides = _terminal(system.space, states[-1], problem.goal_lower, problem.goal_upper)
     value_x = 2 * problem.goal_weight * sides * excess
     value_xx = 2 * problem.goal_weight * sides[..., None] * np.eye(n)
-    ridge = (2 * dt * damping)[:, None, None] * np.eye(m)
     shift, gain = np.empty_like(wanted), np.empty((*wanted.shape, n))
-    sound = np.ones(len(damping), dtype=bool)
     for k in reversed(range(len(wanted))):
         q_z = slope[k] + (step[k].mT @ value_x[..., None])[..., 0]
         q_zz = curvature[k] + step[k].mT @ value_xx @ step[k]
         q_uu, q_ux = q_zz[:, n:, n:], q_zz[:, n:, :n]
-        inverse, sound = _inverses(q_uu + ridge, sound)
+        inverse = _inverses(q_uu, 2 * dt * damping)
         shift[k] = -(inverse @ q_z[:, n:, None])[..., 0]
         gain[k] = -(inverse @ q_ux)
         # The form that stays exact for gains of a damped Q_uu.
@@ -254,18 +238,14 @@ def _backward(problem: _Problem, path: _Path, damping: Floats) -> tuple[Floats, 
         value_x += (q_ux.mT @ shift[k][..., None])[..., 0]
         value_xx = q_zz[:, :n, :n] + turn @ (q_uu @ gain[k] + q_ux) + q_ux.mT @ gain[k]
         value_xx = (value_xx + value_xx.mT) / 2
-    shift[:, ~sound], gain[:, ~sound] = 0.0, 0.0
     return shift, gain
 
 
-def _inverses(matrices: Floats, sound: Bools) -> tuple[Floats, Bools]:
-    """Inverses (B, m, m) of symmetric matrices, and which members were positive definite so far."""
+def _inverses(matrices: Floats, ridge: Floats) -> Floats:
+    """(Q + ridge 1)^-1 (B, m, m) of symmetric matrices, negative eigenvalues taken as 0."""
     finite = np.asarray(np.all(np.isfinite(matrices), axis=(1, 2)))
-    matrices = np.where(finite[:, None, None], matrices, np.eye(matrices.shape[-1]))
-    values, vectors = np.linalg.eigh(matrices)
-    sound = sound & finite & np.asarray(values[:, 0] > 0)
-    values = np.where(sound[:, None], values, 1.0)
-    return (vectors / values[:, None, :]) @ vectors.mT, sound
+    values, vectors = np.linalg.eigh(np.where(finite[:, None, None], matrices, 0.0))
+    return (vectors / (np.maximum(values, 0.0) + ridge[:, None])[:, None, :]) @ vectors.mT
 
 
 def _roll_out(

@@ -162,7 +162,8 @@ def _merged(
     mdp: TabularMDP, cells: Ints, chances: Floats, row_of: Ints, rows_after: int
 ) -> sparse.csr_matrix:
     """(Q, rows_after) transition probabilities, the moves to one successor added up."""
-    order, successor, begins = (part[cells] for part in mdp.by_successor)
+    order, successor, begins = mdp.by_successor
+    order, successor, begins = order[cells], successor[cells], begins[cells]
     first = np.flatnonzero(begins)
     weight = np.add.reduceat(np.take_along_axis(chances, order, axis=1).ravel(), first)
     column = row_of[successor.ravel()[first]]

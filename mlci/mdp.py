@@ -160,20 +160,16 @@ def discretize(
     points = starts.shape[1]
     moves = len(actions) * points
     substeps = substep_count(system, grid, actions, dt)
+    applied = np.repeat(actions, points, axis=0)  # (M, m) the control of each move
     parts = []
     block = max(1, _MOVES_AT_ONCE // (moves * substeps))
     for first in range(0, grid.size, block):
-        origin = starts[first : first + block, None, :, :]  # cell, action, start point, n
-        control = actions[None, :, None, :]
-        origin, control = (
-            np.broadcast_to(origin, (len(origin), len(actions), *origin.shape[2:])),
-            np.broadcast_to(control, (len(origin), len(actions), points, actions.shape[1])),
-        )
-        reward = system.running_reward(origin, control) * (dt / temperature)
-        origin = origin.reshape(-1, origin.shape[-1])
-        held = control.reshape(-1, 1, actions.shape[1])
-        path = rollout(system, origin, held, dt, substeps)
-        parts.append((*_follow(grid, regions, path), reward.reshape(-1)))
+        inside = starts[first : first + block]
+        origin = np.tile(inside, (1, len(actions), 1)).reshape(-1, inside.shape[-1])
+        control = np.tile(applied, (len(inside), 1))
+        path = rollout(system, origin, control[:, None, :], dt, substeps)
+        rewards = system.running_reward(origin, control) * (dt / temperature)
+        parts.append((*_follow(grid, regions, path), rewards))
     successor, crosses, reward = zip(*parts, strict=True)
     cells = np.concatenate(successor).reshape(grid.size, moves)
     return TabularMDP(

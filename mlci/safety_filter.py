@@ -1,4 +1,4 @@
-"""The least restrictive safety filter: any control is free until a hold would leave the safe set."""
+"""The least restrictive safety filter: a control is free until it would leave the safe set."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def default_margin(system: System, grid: Grid, dt: float) -> float:
 
 
 def border_margin(system: System, safe_set: SafeSet, dt: float) -> float:
-    """A margin for `SafetyFilter`: the most that V changes over one cell and one hold at the border.
+    """A margin for `SafetyFilter`: the most that V changes over a cell and a hold at the border.
 
     The grid knows the border to about a cell, and a hold moves the state on before the next
     decision. Over both, V changes by at most sum_d |dV/dx_d| (width_d + max_u |h_d| dt); the margin

@@ -5,6 +5,7 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -79,7 +80,7 @@ def draw(
         axes.set_title(title)
         bar = figure.colorbar(cells, ax=axes, shrink=0.85, pad=0.02)
         ticks = top * np.array([0, 1 / 16, 1 / 4, 9 / 16, 1])
-        bar.set_ticks(np.sqrt(ticks), labels=[f"{tick:.2g}" for tick in ticks])
+        bar.set_ticks(np.sqrt(ticks).tolist(), labels=[f"{tick:.2g}" for tick in ticks])
         bar.set_label("likelihood gain $L_i$ [nat]")
         bar.outline.set_linewidth(0.5)
         _legend(figure, "covered_by_truth" in hypotheses)
@@ -106,10 +107,10 @@ def _outline(box: Rectangle, colour: str, width: float) -> Rectangle:
     )
 
 
-def _draw_paths(axes: plt.Axes, paths: pd.DataFrame, x: pd.Series, y: pd.Series) -> None:
+def _draw_paths(axes: Axes, paths: pd.DataFrame, x: pd.Series, y: pd.Series) -> None:
     """Each path as a thin line, broken where a periodic dimension wraps; starts and ends marked."""
     for _, path in paths.groupby("demonstration", sort=True):
-        points = path[[x["name"], y["name"]]].to_numpy(dtype=float)
+        points = path[[x["name"], y["name"]]].to_numpy(dtype=float).copy()
         for column, dimension in enumerate((x, y)):
             if dimension["periodic"]:
                 period = dimension["upper"] - dimension["lower"]

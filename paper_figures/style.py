@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -38,13 +39,13 @@ RC = {
 }
 
 
-def new_figure(width: float, height: float, **options: object) -> tuple[Figure, object]:
+def new_figure(width: float, height: float, **options: Any) -> tuple[Figure, Any]:
     """`plt.subplots` in inches and in this style, with a layout that keeps labels apart."""
     with plt.rc_context(RC):
-        return plt.subplots(figsize=(width, height), layout="constrained", **options)  # type: ignore[arg-type]
+        return plt.subplots(figsize=(width, height), layout="constrained", **options)
 
 
-def mark(cells: int, rank: int) -> dict[str, object]:
+def mark(cells: int, rank: int) -> dict[str, Any]:
     """Colour and mark of a curve for a number of cells, the `rank`-th curve of its axes."""
     spare = rank % len(OTHER_MARKS)
     return {

@@ -77,7 +77,7 @@ def test_a_trial_does_not_depend_on_how_many_there_are():
         for item in many
         for number in (*item.task.start, *item.task.goal.lower, *np.unique(item.guesses))
     ]
-    assert len(set(drawn)) == 8 * (2 + 2 + 3 * 5)
+    assert len(set(drawn)) == 8 * (2 + 2 + 3 * 10)
 
 
 def test_starts_and_goals_fill_the_safe_part_of_the_box(safe_set):
@@ -177,7 +177,7 @@ def test_motion_between_samples_counts():
     assert entered([0.10, 0.4], [0.15, 0.6]) == [True]  # the motion passes, the chord does not
     assert entered([0.24, 0.4], [0.26, 0.6]) == [True]  # the chord passes, the motion does not
     assert entered([0.4, 0.4], [0.5, 0.6]) == [False]
-    assert entered([0.5, 0.9], [0.6, 1.0]) == [False]  # they touch a corner
+    assert entered([-0.1, -0.1], [0.0, 0.0]) == [False]  # they touch a corner
 
 
 def test_impossible_studies_are_refused(safe_set):

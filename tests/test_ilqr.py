@@ -208,6 +208,23 @@ class Broken(Override):
         return by_state, by_control + np.where(states[..., :1, None] < 0, np.nan, 1.0)
 
 
+class Fuse(Override):
+    """Passes controls up to 1.2, and blows beyond."""
+
+    def apply(self, states, controls):
+        return np.where(np.abs(controls) > 1.2, np.nan, controls)
+
+    def linearize(self, states, controls):
+        return np.zeros((*controls.shape, 2)), np.ones((*controls.shape, 1))
+
+
+def test_step_that_fails_leaves_the_shorter_ones():
+    # The full step of the first iteration is the optimum, which needs controls up to 1.5.
+    found = solve_one(MASS, [0, 0], [1, 0], np.zeros((200, 1)), safety_filter=Fuse(), iterations=1)
+    halfway = 0.5 * solve_one(MASS, [0, 0], [1, 0], np.zeros((200, 1)), iterations=1).controls
+    np.testing.assert_allclose(found.controls, halfway, atol=1e-6)
+
+
 def test_members_that_diverge_or_lose_their_hessian_poison_nobody():
     starts = np.array([[1.0, 0.0], [-1.0, 0.0], [1e300, 0.0], [1.5, 0.0]])
     goals, guesses = np.array([[2.0, 0.0]] * 4), np.full((4, 100, 1), 0.2)

@@ -25,7 +25,7 @@ MAY_IMPORT = {
     "safety_filter": SETS | MOTION | {"reachability"},
     "ilqr": MOTION,
     "demonstrations": SETS | MOTION | {"reachability", "safety_filter", "ilqr"},
-    "recording_formats": SPACES,
+    "recording_formats": MOTION,
     "recordings": MOTION | {"demonstrations", "recording_formats"},
     "mdp": SETS | MOTION,
     "maxent": TABULAR,

@@ -83,7 +83,7 @@ def test_a_drift_that_control_cannot_hold_moves_the_border_against_it(control_li
     safe_set = solve(system, grid, keep_out, horizon=horizon)
     # Left of -1 the distance to K is measured to its other side.
     expected = grid.centers[:, 0] - (1 - control_limit) * horizon
-    clear = expected > -0.8
+    clear = expected > -0.5
     np.testing.assert_allclose(safe_set.values[clear], expected[clear], atol=1e-3)
     if control_limit:
         best = safe_set.safe_control(system, grid.centers[clear])
@@ -97,7 +97,7 @@ def test_the_border_wraps_round_a_circle():
     late = np.linspace(0, 1.5, 301)
     expected = np.min(keep_out.signed_distance(x[:, None] - late[:, None]), axis=1)
     values = solve(system, Grid(system.space, (240,)), keep_out, horizon=1.5).value(x)
-    np.testing.assert_allclose(values, expected, atol=0.03)
+    np.testing.assert_allclose(values, expected, atol=0.06)
 
 
 def test_smooth_parts_converge_at_second_order():
@@ -147,7 +147,14 @@ def test_the_value_never_grows_with_the_horizon():
     for sooner, later in itertools.pairwise(values):
         assert np.all(later <= sooner + 1e-9)
         assert np.any(later < sooner - 0.01)
-    assert np.all(solve(PENDULUM, grid, keep_out).values <= values[-1] + 1e-9)
+
+
+def test_a_fixed_point_stands_still():
+    grid, keep_out = Grid(PENDULUM.space, (41, 41)), region(PENDULUM, BOTTOM)
+    settled = solve(PENDULUM, grid, keep_out).values
+    late = solve(PENDULUM, grid, keep_out, horizon=30.0).values
+    near = np.abs(settled) < 0.3
+    np.testing.assert_allclose(settled[near], late[near], atol=0.002)
 
 
 def switching_sequences(limit, steps):
@@ -176,11 +183,9 @@ def near_border(safe_set, count, cells=(2, 4)):
     grid = safe_set.grid
     directions = np.array(list(itertools.product((-1, 0, 1), repeat=len(grid.shape))))
     states = np.random.default_rng(0).uniform(
-        grid.space.bounds.lower, 0.8 * grid.space.bounds.upper, (40_000, len(grid.shape))
+        grid.space.bounds.lower, grid.space.bounds.upper, (40_000, len(grid.shape))
     )
-    near, far = (
-        safe_set.contains(states[:, None] + k * directions * grid.widths) for k in cells
-    )
+    near, far = (safe_set.contains(states[:, None] + k * directions * grid.widths) for k in cells)
     border = ~(far.all(axis=1) | (~far).all(axis=1))
     return states[border & near.all(axis=1)][:count], states[border & ~near.any(axis=1)][:count]
 
@@ -191,6 +196,55 @@ def test_brute_force_agrees_on_both_sides_of_the_border(system, corners):
     keep_out = region(system, corners)
     safe_set = solve(system, Grid(system.space, (101, 101)), keep_out)
     inside, doomed = near_border(safe_set, 20)
-    print(len(inside), len(doomed))
-    assert np.mean(survivors(system, keep_out, inside, 6.0)) == 1
+    assert len(inside) == len(doomed) == 20
+    assert np.all(survivors(system, keep_out, inside, 6.0))
     assert not np.any(survivors(system, keep_out, doomed, 6.0))
+
+
+def constant_control_bound(system, keep_out, states, seconds=6.0, dt=0.01):
+    """The best constant extreme control's least distance to K: V is at least as large."""
+    best = np.full(len(states), -np.inf)
+    for control in system.control_box.vertices():
+        now, least = states, keep_out.signed_distance(states)
+        for _ in range(round(seconds / dt)):
+            now = rk4_step(system, now, control, dt)
+            least = np.minimum(least, keep_out.signed_distance(now))
+        best = np.maximum(best, least)
+    return best
+
+
+@pytest.mark.parametrize("corners", [BOTTOM, SIDE])
+def test_the_border_is_that_of_the_best_constant_control(corners):
+    keep_out, counts = region(PENDULUM, corners), [51, 101, 201]
+    middle, half = np.mean(corners, axis=0), np.array([1.0, 1.4])
+    states = np.random.default_rng(0).uniform(middle - half, middle + half, (2000, 2))
+    exact = constant_control_bound(PENDULUM, keep_out, states)
+    near = np.abs(exact) < 0.1
+    errors = []
+    for count in counts:
+        safe_set = solve(PENDULUM, Grid(PENDULUM.space, (count, count)), keep_out)
+        errors.append(np.abs(safe_set.value(states[near]) - exact[near]).mean())
+    assert errors[1] < 0.003
+    assert np.all(orders(errors, counts) > 1.0)
+
+
+def test_impossible_problems_are_refused():
+    grid, keep_out = Grid(PENDULUM.space, (11, 11)), region(PENDULUM, BOTTOM)
+    with pytest.raises(ValueError, match="horizon must be at least 0 s, not -1"):
+        solve(PENDULUM, grid, keep_out, horizon=-1)
+    with pytest.raises(ValueError, match="tolerance must be positive, not 0"):
+        solve(PENDULUM, grid, keep_out, tolerance=0)
+    needle = region(PENDULUM, ((3.0, 0.0), (3.01, 0.01)))
+    with pytest.raises(ValueError, match=r"region 1 must hold .* a \[11, 11\] grid"):
+        solve(PENDULUM, grid, keep_out.joined(needle))
+    everything = region(PENDULUM, ((-FREE, -FREE), (FREE, FREE)))
+    with pytest.raises(ValueError, match="not the whole space"):
+        solve(PENDULUM, grid, everything)
+
+
+def test_a_safe_set_checks_its_arrays():
+    grid = Grid(PENDULUM.space, (4, 5))
+    with pytest.raises(ValueError, match=r"values \(20,\) and gradients \(20, 2\), not \(4, 5\)"):
+        SafeSet(grid, np.zeros((4, 5)), np.zeros((20, 2)))
+    with pytest.raises(ValueError, match="finite"):
+        SafeSet(grid, np.full(20, np.nan), np.zeros((20, 2)))

@@ -121,7 +121,7 @@ def test_jumps_at_the_seam_are_undone(tmp_path, swing):
 
 
 def test_columns_in_any_order_rounded_times_blank_lines_and_a_byte_order_mark(tmp_path):
-    text = "\ufefffoot, angle ,time,angular_velocity\nL,1,0.000,2\nR,1.1,0.033,2\n\nL,1.2,0.067,2\n"
+    text = "\ufefftime,foot,angular_velocity, angle\n0.000,L,2,1\n0.033,R,2,1.1\n\n0.067,L,2,1.2\n"
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     read = read_one(tmp_path / "a.csv")
     assert read.states.tolist() == [[1, 2], [1.1, 2], [1.2, 2]]
@@ -132,6 +132,8 @@ def test_controls_are_never_needed(tmp_path):
     (tmp_path / "a.csv").write_text(
         "time,angle,angular_velocity,control_1\n0,1,0,oops\n1,1,0,2\n2,1,0,\n"
     )
+    assert read_one(tmp_path / "a.csv").controls is None
+    (tmp_path / "a.csv").write_text("1,1,1\n0,0,0\n2,oops,2\n")
     assert read_one(tmp_path / "a.csv").controls is None
 
 

@@ -1,0 +1,271 @@
+"""Configs compose and validate; wrong ones are refused with a clear message, and write nothing."""
+
+import dataclasses
+import math
+import sys
+from pathlib import Path
+
+import pytest
+from hydra import compose, initialize_config_dir
+
+from experiments import run
+from experiments.config import ConfigError, read_config
+from experiments.errors import CONF
+from experiments.planner import quote_options
+from experiments.record import Point
+from experiments.schema import Problems, parse
+from experiments.task import plain_tree
+
+run.register_plugins()
+
+
+def composed(*overrides: str) -> dict:
+    with initialize_config_dir(str(CONF), version_base="1.3"):
+        return plain_tree(compose("config", [quote_options(word) for word in overrides]))
+
+
+def options(group: str) -> list[str]:
+    return sorted(path.stem for path in (CONF / group).glob("*.yaml"))
+
+
+def identity(*overrides: str) -> str:
+    return Point(read_config(composed(*overrides))[0], Path()).identity
+
+
+def suits(system: str, truth: str) -> bool:
+    """Whether a truth can be inferred with a system: that it stays in bounds and can be ranked."""
+    try:
+        read_config(composed(f"system={system}", f"truth={truth}"))
+    except ConfigError as error:
+        # Anything else that is wrong is for the test to show.
+        if str(error).startswith("truth"):
+            return False
+        raise
+    return True
+
+
+@pytest.mark.parametrize("truth", options("truth"))
+def test_every_truth_suits_a_system(truth: str) -> None:
+    assert any(suits(system, truth) for system in options("system"))
+
+
+@pytest.mark.parametrize("system", options("system"))
+def test_every_system_suits_a_truth(system: str) -> None:
+    assert any(suits(system, truth) for truth in options("truth"))
+
+
+@pytest.mark.parametrize("grid", options("grid"))
+def test_every_grid_has_the_cells_of_its_name(grid: str) -> None:
+    settings, _ = read_config(composed(f"grid={grid}"))
+    assert settings.cells.size == settings.columns["cells"] == int(grid)
+
+
+@pytest.mark.parametrize("experiment", options("experiment"))
+def test_every_experiment_names_its_study(experiment: str) -> None:
+    _, study = read_config(composed(f"experiment={experiment}"))
+    assert study.study == experiment
+
+
+def test_defaults_are_the_walk_of_the_paper() -> None:
+    settings, _ = read_config(composed())
+    box = settings.constraint.box(0)
+    assert box.lower == pytest.approx([math.pi, 0])
+    assert box.upper == pytest.approx([6 / 5 * math.pi, 1.2])
+    assert (settings.cells.shape, settings.action_counts, settings.dt) == ((20, 20), (9,), 0.25)
+    assert len(settings.candidates) == 100
+    read = read_config(composed("truth=c2"))[0].constraint.box(0)
+    assert read.lower[0] == pytest.approx(8 / 5 * math.pi)
+    assert read.upper[0] == pytest.approx(9 / 5 * math.pi)
+
+
+@pytest.mark.parametrize(
+    ("words", "value"),
+    [
+        ("pi", 1),
+        ("6/5 pi", 1.2),
+        ("-pi/2", -0.5),
+        ("2pi", 2),
+        ("1.5 * pi", 1.5),
+        ("-3/4 pi", -0.75),
+    ],
+)
+def test_multiples_of_pi_in_words(words: str, value: float) -> None:
+    problems = Problems()
+    assert parse(float, words, "key", problems) == pytest.approx(value * math.pi, rel=1e-15)
+    assert not problems
+
+
+def test_spelling_does_not_change_identity() -> None:
+    same = [
+        identity("dt=1"),
+        identity("dt=1.0", "study=other", "results=elsewhere", "workers=3"),
+        identity("dt=1", "truth.boxes=[{lower:[3.141592653589793,0],upper:['6/5 pi',1.2]}]"),
+        identity("dt=1", "~system.gravity"),
+        identity("dt=1", "grid=100", "grid.shape=[20,20]"),
+    ]
+    assert len(set(same)) == 1
+
+
+def test_every_setting_changes_identity() -> None:
+    settings, _ = read_config(composed())
+
+    def variants(value: object) -> list:
+        """Copies of a nested dataclass, each with one leaf changed."""
+        if not dataclasses.is_dataclass(value):
+            return ["another"]
+        return [
+            dataclasses.replace(value, **{field.name: other})
+            for field in dataclasses.fields(value)
+            for other in variants(getattr(value, field.name))
+        ]
+
+    found = variants(settings)
+    assert len(found) > 30
+    assert len({Point(other, Path()).identity for other in [settings, *found]}) == len(found) + 1
+
+
+WRONG = [
+    ("dtt=0.2", "dtt: unknown key; did you mean dt?"),
+    ("+dtt=0.2", "dtt: unknown key; did you mean dt?"),
+    ("demonstrations.pars=3", "demonstrations.pars: unknown key; did you mean pairs?"),
+    ("++demonstrations.pars=3", "demonstrations.pars: unknown key; did you mean pairs?"),
+    ("system.gravty=2", "system.gravty: unknown key; did you mean gravity?"),
+    ("+system.gravty=2", "system.gravty: Pendulum has no such argument; did you mean gravity?"),
+    ("system._target_=os.system", "'os.system' is not a subclass of mlci.systems.System"),
+    ("system._target_=mlci.systems.System", "is not a subclass"),
+    ("system._target_=nowhere.Pendulum", "system._target_: 'nowhere.Pendulum' cannot be imported"),
+    ("system.speed_limit=-1", "system: Pendulum.speed_limit must be positive, not -1.0"),
+    ("system.speed_limit=fast", "system.speed_limit: 'fast' is not a finite number"),
+    ("~system._target_", "system._target_: missing"),
+    ("grid=300", "grid: there is no 300; there are 100, 400, 900, 1600"),
+    ("truth=c9", "truth: there is no c9; there are c1, c2, wall"),
+    ("grdi=100", "grdi: unknown key; did you mean grid?"),
+    ("dt=[1", "dt=[1: cannot be read as key=value"),
+    ("dt", "dt: cannot be read as key=value"),
+    ("dt=fast", "dt: 'fast' is not a finite number"),
+    ("dt=nan", "dt: nan is not a finite number"),
+    ("dt=true", "dt: True is not a finite number"),
+    ("dt=", "dt: '' is not a finite number"),
+    ("dt=${nothing}", "dt: Interpolation key 'nothing' not found"),
+    ("dt=???", "dt: missing; give it a value"),
+    ("~dt", "dt: missing; give it a value"),
+    ("dt=0.2,0.25", "dt: several values need -m, for a sweep, or dt=[0.2,0.25], for a list"),
+    ("dt=0", "dt: 0.0 must be above 0"),
+    ("dt=0.3", "dt: 0.3 does not cut the horizon 5.0 into whole steps; try 0.25 or 0.3125"),
+    ("dt=7", "dt: 7.0 does not cut the horizon 5.0 into whole steps; try 5"),
+    ("dt=1e-300", "dt: 1e-300 cuts the horizon 5.0 into more than 100000 steps"),
+    ("demonstrations.dt=0.03", "demonstrations.dt: 0.03 does not cut the horizon"),
+    ("seed=-1", "seed: -1 must not be below 0"),
+    ("seed=1.5", "seed: 1.5 is not a whole number"),
+    ("temperature=0", "temperature: 0.0 must be above 0"),
+    ("actions=0", "actions: 0 must be at least 1"),
+    ("actions=[3,4]", "actions: [3, 4] must be one number, or a list of 1"),
+    ("actions=1000000", "grid.shape: [20, 20] makes 4e+08 transitions, over 1e+08; use fewer"),
+    ("rollouts=10000000", "rollouts: 10000000 is above 1000000"),
+    ("transition.samples=0", "transition.samples: 0 must be at least 1"),
+    ("inference.prior=1", "inference.prior: 1.0 must lie between 0 and 1"),
+    ("demonstrations.keep=101", "demonstrations.keep: 101 is more than the 100 of"),
+    ("grid.shape=[]", "grid.shape: [] is empty"),
+    ("grid.shape=[0,5]", "grid.shape: [0, 5] must be at least 1"),
+    ("grid.shape=9", "grid.shape: 9 is not a list"),
+    (
+        "grid.shape=[5,6,7]",
+        "grid.shape: [5, 6, 7] must have 2 entries, one each for angle",
+    ),
+    ("system=double_integrator", "truth.boxes[0]: position from 3.14159 to 3.76991 leaves"),
+    ("truth.boxes=[]", "truth.boxes: [] is empty"),
+    ("truth.boxes=[{lower:[0],upper:[1]}]", "truth.boxes[0].lower: [0.0] must have 2 entries"),
+    ("truth.boxes=[{lower:[0,1],upper:[1,0]}]", "angular_velocity goes from 1.0 to 0.0"),
+    ("truth.boxes=[{lower:[0,null],upper:[1,0]}]", "angular_velocity has one side only"),
+    ("truth.boxes=[{lower:[0,1],upper:[7,2]}]", "is over a whole turn; use null twice"),
+    ("truth.boxes=[{lower:[0,1],top:[1,2]}]", "truth.boxes[0].top: unknown key"),
+    ("truth.boxes=[{lower:[3,0],upper:[3.1,1]}]", "truth: c1 covers no hypothesis entirely"),
+    ("hypotheses.shape=null", "hypotheses: no shape and no boxes"),
+    ("study=../x", "study: '../x' cannot name a folder"),
+    ("workers=0", "workers: 0 must be at least 1"),
+    ("hydra.run.dirr=x", "hydra.run.dirr: unknown key; did you mean dir?"),
+]
+
+
+def refusal(
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> str:
+    """What the command says about a config that it refuses."""
+    monkeypatch.setattr(sys, "argv", ["run.py", *arguments])
+    try:
+        status = run.main()
+    except SystemExit as stop:
+        status = stop.code
+    out, err = capsys.readouterr()
+    assert status == run.REFUSED
+    assert out == ""
+    assert "Traceback" not in err
+    assert len(err.splitlines()) < 10
+    return err
+
+
+@pytest.mark.parametrize(("argument", "message"), WRONG)
+def test_wrong_value_is_refused(
+    argument: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = refusal([argument, "results=results"], monkeypatch, capsys)
+    assert message in said
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"boxes: [1\n", "/truth/mine.yaml, line 2: not valid YAML"),
+        (b"name: a\nname: b\n", "/truth/mine.yaml, line 2: not valid YAML"),
+        (b"name: \xff\n", "/truth/mine.yaml: byte 6 is not UTF-8"),
+        (b"- a\n", "truth: ['a'] is not a group of values"),
+        (b"", "truth.name: missing"),
+        (b"defaults: 3\n", "Invalid defaults list in 'truth/mine'"),
+    ],
+)
+def test_broken_file_is_refused(
+    content: bytes,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "truth").mkdir()
+    (tmp_path / "truth" / "mine.yaml").write_bytes(content)
+    said = refusal(["--config-dir", str(tmp_path), "truth=mine"], monkeypatch, capsys)
+    assert message in said
+
+
+def test_all_wrong_points_of_a_sweep_are_reported_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["-m", "dt=0.25,0.3", "actions=0,5", f"results={tmp_path}"]
+    said = refusal(arguments, monkeypatch, capsys)
+    assert "actions: 0 must be at least 1 [2 of 4 points, such as dt=0.25 actions=0]" in said
+    assert "dt: 0.3 does not cut" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-m", "grid=100,300"], "grid: there is no 300; there are 100, 400, 900, 1600 [1 of 2"),
+        (["-m", "experiment=paper,smoke"], "experiment=paper,smoke: a sweep over experiments"),
+        (["-m", "study=a,b"], "study=a,b: this changes no result"),
+        (["-m", "dt=interval(0,1)"], "dt=interval(0,1): cannot be swept; list its values"),
+        (["experiment=smoke", "hydra.mode=RUN"], "experiment: this one describes a sweep; add -m"),
+    ],
+)
+def test_sweep_that_cannot_be_is_refused(
+    arguments: list[str],
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert message in refusal(arguments, monkeypatch, capsys)
