@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import Future, as_completed
+from multiprocessing import resource_tracker
 from typing import Any
 
 from hydra.core.utils import JobReturn, JobStatus
@@ -50,6 +51,7 @@ class PoolLauncher(Launcher):
         jobs = [tuple(overrides) for overrides in job_overrides]
         spawn = multiprocessing.get_context("spawn")
         pool = ProcessPool(min(self.workers, len(jobs)), context=spawn)
+        resource_tracker.ensure_running()  # its start would unblock the signal
         try:
             # Workers inherit the mask: Ctrl-C reaches this process only, which then stops them.
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

@@ -32,7 +32,9 @@ def main() -> int:
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises its errors, and they are worded here
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a clean stop, as after Ctrl-C
     register_plugins()
-    sys.argv[1:] = map(quote_options, sys.argv[1:])
+    # Hydra wants -m before, or after, all overrides.
+    words = sorted(sys.argv[1:], key=lambda word: word not in ("-m", "--multirun"))
+    sys.argv[1:] = [quote_options(word) for word in words]
     try:
         hydra.main(config_path=str(CONF), config_name="config", version_base="1.3")(_run_once)()
     except KeyboardInterrupt:

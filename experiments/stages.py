@@ -20,7 +20,7 @@ from experiments.store import Store
 from mlci.demonstrations import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.reachability import SafeSet, solve
-from mlci.safety_filter import SafetyFilter, default_margin
+from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.spaces import Box, Floats, Ints
 
 
@@ -80,7 +80,7 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
     omega, omega_key = safe_set(settings, store)
     margin = safety.margin
     if margin is None:
-        margin = default_margin(system, omega.grid, chosen.dt)
+        margin = border_margin(system, omega, chosen.dt)
 
     def compute() -> dict[str, np.ndarray]:
         trials = sample_trials(

@@ -118,10 +118,17 @@ class Trial:
     Attributes:
         task: the task.
         guesses: (R, K, m) one control sequence a restart.
+
+    Raises:
+        ValueError: guesses that are empty or do not have three axes.
     """
 
     task: Task
     guesses: Floats
+
+    def __post_init__(self) -> None:
+        if self.guesses.ndim != 3 or not self.guesses.size:
+            raise ValueError(f"a trial needs guesses (R, K, m), not {self.guesses.shape}")
 
 
 class Outcome(StrEnum):
@@ -131,9 +138,6 @@ class Outcome(StrEnum):
     BOUNDS_LEFT = "bounds_left"
     GOAL_MISSED = "goal_missed"
     KEPT = "kept"
-
-
-_REASONS = (Outcome.TRUTH_ENTERED, Outcome.BOUNDS_LEFT, Outcome.GOAL_MISSED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +230,7 @@ def demonstrate(
     The best restart is the cheapest that could be kept; if none could, the cheapest.
 
     Args:
+        trials: at least one; all with guesses of one shape.
         truth: the regions that the demonstrator may not enter.
         safety_filter: keeps it out of them; None lets it go anywhere.
         dt: sampling time [s].
@@ -236,8 +241,7 @@ def demonstrate(
     Returns:
         One attempt a trial, in their order.
     """
-    tasks, shape = [trial.task for trial in trials], trials[0].guesses.shape
-    restarts = shape[0]
+    tasks, restarts = [trial.task for trial in trials], len(trials[0].guesses)
     solution = optimize(
         system,
         np.repeat([task.start for task in tasks], restarts, axis=0),
@@ -259,7 +263,7 @@ def demonstrate(
         misses = np.linalg.norm(system.space.excess(solution.states[own, -1], task.goal), axis=-1)
         failures = np.array([entered[own], left[own], ~(misses <= goal_tolerance)])
         best = int(np.lexsort([solution.cost[own], failures.any(axis=0)])[0])
-        outcome = [*_REASONS, Outcome.KEPT][int(np.argmax([*failures[:, best], True]))]
+        outcome = list(Outcome)[int(np.argmax([*failures[:, best], True]))]
         path, controls = solution.states[own[best]], solution.controls[own[best]]
         demonstration = Demonstration(task, path, controls, dt, f"trial_{number:03d}")
         cost = float(solution.cost[own[best]])

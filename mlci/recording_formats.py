@@ -105,9 +105,10 @@ def _from_rows(rows: list[tuple[int, list[str]]], system: System, dt: float) -> 
 def _read_npz(file: Path, system: System, dt: float) -> Recording:
     """A numpy archive."""
     try:
-        with np.load(file, allow_pickle=False) as archive:
+        # numpy leaves a file of its own open where it is no archive.
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             arrays = {key: np.asarray(archive[key], dtype=float) for key in archive.files}
-    except (zipfile.BadZipFile, ValueError, EOFError, AttributeError) as error:
+    except (zipfile.BadZipFile, ValueError, EOFError, TypeError) as error:
         raise ValueError(f"is not an archive of numeric arrays ({error})") from None
     n, states = system.space.dimension, arrays.get("states")
     if states is None or states.ndim != 2 or states.shape[1] != n:

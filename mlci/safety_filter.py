@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlci.grids import Grid
 from mlci.reachability import SafeSet
 from mlci.spaces import Floats
 from mlci.systems import System
@@ -97,15 +96,6 @@ class SafetyFilter:
         return z * z * (3 - 2 * z), 6 * z * (1 - z) / self.width
 
 
-def default_margin(system: System, grid: Grid, dt: float) -> float:
-    """A margin that covers one hold and the error of the value grid, in the unit of V."""
-    rates = [
-        np.linalg.norm(system.dynamics(grid.centers, vertex), axis=-1)
-        for vertex in system.control_box.vertices()
-    ]
-    return float(np.max(rates) * dt + np.linalg.norm(grid.widths) / 2)
-
-
 def border_margin(system: System, safe_set: SafeSet, dt: float) -> float:
     """A margin for `SafetyFilter`: the most that V changes over a cell and a hold at the border.
 
@@ -122,6 +112,10 @@ def border_margin(system: System, safe_set: SafeSet, dt: float) -> float:
 
     Returns:
         The margin, in the unit of V; 0 if the border does not cross the grid.
+
+    Raises:
+        ValueError: the margin exceeds V everywhere. V jumps where a weak control decides at once
+            between escape and capture, and then no level of V says how far the border is.
     """
     grid = safe_set.grid
     doomed = safe_set.values.reshape(grid.shape) < 0
@@ -138,4 +132,10 @@ def border_margin(system: System, safe_set: SafeSet, dt: float) -> float:
     ]
     reach = grid.widths + dt * np.max(rates, axis=0)
     change = np.sum(np.abs(safe_set.gradients[chosen]) * reach, axis=-1)
-    return float(np.max(change, initial=0.0))
+    margin = float(np.max(change, initial=0.0))
+    if margin > np.max(safe_set.values):
+        raise ValueError(
+            f"V changes by up to {margin:.3g} over a cell and a hold at the border, more than its "
+            f"largest value {np.max(safe_set.values):.3g}: choose a margin by hand"
+        )
+    return margin

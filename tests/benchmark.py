@@ -26,7 +26,7 @@ from mlci.grids import Grid
 from mlci.maxent import log_partition, policy, violation_probabilities
 from mlci.mdp import TabularMDP, action_grid, discretize, substep_count
 from mlci.reachability import solve
-from mlci.safety_filter import SafetyFilter, default_margin
+from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import rk4_step
 from mlci.spaces import Box, Floats
 from mlci.systems import Pendulum
@@ -103,9 +103,9 @@ def inference_rows(cells: int, dt: float, samples: int) -> list[tuple[str, float
 
 def demonstrator_rows() -> list[tuple[str, float, float]]:
     """Safe set, and 100 tasks x 3 restarts of iLQR with the filter."""
-    grid = Grid(SYSTEM.space, (101, 101))
+    grid = Grid(SYSTEM.space, (201, 201))
     omega = solve(SYSTEM, grid, TRUTH)
-    margin = default_margin(SYSTEM, grid, 0.01)
+    margin = border_margin(SYSTEM, omega, 0.01)
     box = Box(np.array([0.0, -2.0]), np.array([2 * np.pi, 2.0]))
     trials = sample_trials(
         SYSTEM, omega, box, trials=100, seed=0, horizon=5.0, dt=0.01, margin=margin
@@ -115,7 +115,7 @@ def demonstrator_rows() -> list[tuple[str, float, float]]:
     calls = 500 * 10  # eight step sizes of all restarts, at each time step of each iteration
     return [
         (
-            "safe set, 101 x 101, to convergence",
+            "safe set, 201 x 201, to convergence",
             median_seconds(lambda: solve(SYSTEM, grid, TRUTH), 3),
             np.nan,
         ),

@@ -16,7 +16,7 @@ from mlci.demonstrations import (
 from mlci.grids import Grid
 from mlci.ilqr import optimize
 from mlci.reachability import solve
-from mlci.safety_filter import SafetyFilter, default_margin
+from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import euler_step, rollout
 from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator, Pendulum
@@ -35,7 +35,7 @@ def safe_set():
 
 @pytest.fixture(scope="module")
 def safety_filter(safe_set):
-    margin = default_margin(PENDULUM, safe_set.grid, DT)
+    margin = border_margin(PENDULUM, safe_set, DT)
     return SafetyFilter(PENDULUM, safe_set, DT, margin)
 
 
@@ -203,6 +203,11 @@ def test_impossible_studies_are_refused(safe_set):
 def test_task_checks_itself(start, horizon, message):
     with pytest.raises(ValueError, match=message):
         Task(np.array(start), Box.point([1.0, 0.0]), horizon)
+
+
+def test_trial_checks_itself():
+    with pytest.raises(ValueError, match=r"guesses \(R, K, m\), not \(3, 500\)"):
+        Trial(Task(np.zeros(2), Box.point([1.0, 0.0]), 5.0), np.zeros((3, 500)))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from mlci.constraints import ConstraintSet
 from mlci.grids import Grid
 from mlci.ilqr import optimize
 from mlci.reachability import solve
-from mlci.safety_filter import SafetyFilter, default_margin
+from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import euler_step, rollout
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator, Pendulum, System
@@ -20,13 +20,13 @@ DT = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Linear(System):
-    """x' = drift x + push u, with three states and two controls."""
+    """x' = drift x + push u, with two states and three controls."""
 
     drift: np.ndarray
     push: np.ndarray
 
-    space = StateSpace(Box(-np.ones(3), np.ones(3)), np.zeros(3, dtype=bool), ("a", "b", "c"))
-    control_box = Box(-np.ones(2), np.ones(2))
+    space = StateSpace(Box(-np.ones(2), np.ones(2)), np.zeros(2, dtype=bool), ("a", "b"))
+    control_box = Box(-np.ones(3), np.ones(3))
 
     def dynamics(self, states, controls):
         return states @ self.drift.T + controls @ self.push.T
@@ -34,8 +34,8 @@ class Linear(System):
     def jacobians(self, states, controls):
         batch = states.shape[:-1]
         return (
-            np.broadcast_to(self.drift, (*batch, 3, 3)),
-            np.broadcast_to(self.push, (*batch, 3, 2)),
+            np.broadcast_to(self.drift, (*batch, 2, 2)),
+            np.broadcast_to(self.push, (*batch, 2, 3)),
         )
 
 
@@ -52,17 +52,17 @@ def held_controls(rng, batch, holds, each):
 
 def test_one_iteration_solves_a_linear_quadratic_problem():
     rng = np.random.default_rng(0)
-    system = Linear(rng.normal(size=(3, 3)), rng.normal(size=(3, 2)))
+    system = Linear(rng.normal(size=(2, 2)), rng.normal(size=(2, 3)))
     steps, dt, weight = 40, 0.05, 7.0
-    start, goal = rng.normal(size=3), rng.normal(size=3)
+    start, goal = rng.normal(size=2), rng.normal(size=2)
     # The last state is affine in all controls: x_K = free + reach u, so (8) is ridge regression.
-    basis = np.eye(steps * 2).reshape(-1, steps, 2)
-    free = rollout(system, start, np.zeros((steps, 2)), dt, step=euler_step)[-1]
-    ends = rollout(system, np.tile(start, (steps * 2, 1)), basis, dt, step=euler_step)[:, -1]
+    basis = np.eye(steps * 3).reshape(-1, steps, 3)
+    free = rollout(system, start, np.zeros((steps, 3)), dt, step=euler_step)[-1]
+    ends = rollout(system, np.tile(start, (steps * 3, 1)), basis, dt, step=euler_step)[:, -1]
     reach = (ends - free).T
-    hessian = dt * np.eye(steps * 2) + weight * reach.T @ reach
-    exact = np.linalg.solve(hessian, weight * reach.T @ (goal - free)).reshape(steps, 2)
-    guess = rng.normal(size=(steps, 2))
+    hessian = dt * np.eye(steps * 3) + weight * reach.T @ reach
+    exact = np.linalg.solve(hessian, weight * reach.T @ (goal - free)).reshape(steps, 3)
+    guess = rng.normal(size=(steps, 3))
     found = solve_one(system, start, goal, guess, dt, goal_weight=weight, iterations=1)
     np.testing.assert_allclose(found.controls[0], exact, atol=1e-6)
 
@@ -138,7 +138,7 @@ def safety_filter():
     truth = Box(np.array([np.pi, 0.0]), np.array([1.2 * np.pi, 1.2]))
     grid = Grid(PENDULUM.space, (61, 61))
     safe_set = solve(PENDULUM, grid, ConstraintSet.from_boxes(PENDULUM.space, [truth]))
-    return SafetyFilter(PENDULUM, safe_set, DT, default_margin(PENDULUM, grid, DT), 0.2)
+    return SafetyFilter(PENDULUM, safe_set, DT, border_margin(PENDULUM, safe_set, DT), 0.2)
 
 
 def test_cost_never_rises_and_no_member_sees_another(safety_filter):
@@ -197,15 +197,33 @@ def test_filter_that_overrules_everything_leaves_nothing_to_optimise():
     assert np.all(found.costs == found.costs[0])
 
 
-class Broken(Override):
+class Broken:
     """Passes every control; its derivatives are NaN for paths on the negative side."""
 
     def apply(self, states, controls):
         return controls
 
     def linearize(self, states, controls):
-        by_state, by_control = super().linearize(states, controls)
-        return by_state, by_control + np.where(states[..., :1, None] < 0, np.nan, 1.0)
+        broken = np.where(states[..., :1, None] < -0.5, np.nan, 1.0)
+        by_state = np.zeros((*controls.shape, states.shape[-1]))
+        return by_state, broken * np.eye(controls.shape[-1])
+
+
+class Understated(Override):
+    """Passes every control, and claims to pass a thousandth: steps are far too long."""
+
+    def apply(self, states, controls):
+        return controls
+
+    def linearize(self, states, controls):
+        return np.zeros((*controls.shape, 2)), np.full((*controls.shape, 1), 1e-3)
+
+
+def test_damping_grows_until_a_step_succeeds():
+    options = {"safety_filter": Understated(), "iterations": 20}
+    costs = solve_one(MASS, [0, 0], [1, 0], np.zeros((200, 1)), **options).costs[:, 0]
+    assert costs[1] == costs[0]
+    assert costs[-1] < costs[0] / 10
 
 
 class Fuse(Override):
@@ -226,13 +244,14 @@ def test_step_that_fails_leaves_the_shorter_ones():
 
 
 def test_members_that_diverge_or_lose_their_hessian_poison_nobody():
+    system = Linear(np.zeros((2, 2)), np.eye(2, 3))
     starts = np.array([[1.0, 0.0], [-1.0, 0.0], [1e300, 0.0], [1.5, 0.0]])
-    goals, guesses = np.array([[2.0, 0.0]] * 4), np.full((4, 100, 1), 0.2)
-    found = optimize(MASS, starts, goals, goals, guesses, DT, safety_filter=Broken())
+    goals, guesses = np.array([[2.0, 0.0]] * 4), np.full((4, 100, 3), 0.2)
+    found = optimize(system, starts, goals, goals, guesses, DT, safety_filter=Broken())
     assert found.cost[1] == found.costs[0, 1]
     assert found.cost[2] == np.inf
     for b in (0, 3):
-        alone = solve_one(MASS, starts[b], goals[b], guesses[b], safety_filter=Broken())
+        alone = solve_one(system, starts[b], goals[b], guesses[b], safety_filter=Broken())
         assert alone.cost[0] < found.costs[0, b] / 10
         np.testing.assert_allclose(found.states[b], alone.states[0], atol=1e-9)
 

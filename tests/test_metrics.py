@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -50,7 +52,7 @@ def test_violation_distance_by_hand() -> None:
 def test_random_subsets_are_nested_and_distinct() -> None:
     subsets = random_subsets(8, 20, 5, np.random.default_rng(0))
     assert [part.shape for part in subsets] == [(5, size) for size in range(1, 9)]
-    for smaller, larger in zip(subsets[:-1], subsets[1:], strict=True):
+    for smaller, larger in itertools.pairwise(subsets):
         np.testing.assert_array_equal(larger[:, :-1], smaller)
     assert all(len(set(row)) == 8 for row in subsets[-1].tolist())
 

@@ -240,6 +240,10 @@ def test_impossible_problems_are_refused():
     everything = region(PENDULUM, ((-FREE, -FREE), (FREE, FREE)))
     with pytest.raises(ValueError, match="not the whole space"):
         solve(PENDULUM, grid, everything)
+    slow = Drift(control_limit=0.999)
+    drifting = region(slow, ((-2.0, -FREE, -FREE), (0.0, FREE, FREE)))
+    with pytest.raises(RuntimeError, match=r"falls by 0\.001 per second after 100 s"):
+        solve(slow, Grid(slow.space, (40, 3, 4)), drifting, tolerance=1e-4)
 
 
 def test_a_safe_set_checks_its_arrays():

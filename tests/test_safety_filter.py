@@ -85,15 +85,21 @@ def test_the_margin_serves_other_truths_and_weaker_controls(corners, control_lim
 
 
 def test_the_margin_is_a_cell_and_a_hold_of_the_value():
-    # V = x on a plane that moves at (v, u) with |v| <= 2 near x = 0.
+    # V = x moves at v, at most 2. Far from its border, at x = 0, a steeper V must not count.
     system = DoubleIntegrator(speed_limit=2.0)
     grid = Grid(system.space, (60, 40))
-    slope = np.tile([1.0, 0.0], (grid.size, 1))
+    slope = np.where(np.abs(grid.centers[:, :1]) > 2.5, 5.0, 1.0) * np.array([1.0, 0.0])
     fastest = 2.0 - grid.widths[1] / 2
     omega = SafeSet(grid, grid.centers[:, 0], slope)
     assert border_margin(system, omega, DT) == pytest.approx(grid.widths[0] + DT * fastest)
     nowhere = SafeSet(grid, grid.centers[:, 0] + 10, slope)
     assert border_margin(system, nowhere, DT) == 0
+
+
+def test_a_value_that_jumps_at_the_border_has_no_margin():
+    weak = Pendulum(control_limit=0.5)
+    with pytest.raises(ValueError, match=r"largest value .*choose a margin by hand"):
+        border_margin(weak, safe_set(WALL, 0.5, 31), DT)
 
 
 @pytest.mark.parametrize("width", WIDTHS)

@@ -15,9 +15,9 @@ RUN = [sys.executable, str(CHECKOUT / "experiments" / "run.py")]
 TINY = [
     "system=double_integrator",
     "truth=wall",
-    "grid.shape=[6,6]",
+    "grid.shape=[8,8]",
     "hypotheses.shape=[5,null]",
-    "horizon=2",
+    "horizon=4",
     "dt=0.5",
     "actions=3",
     "rollouts=1",
@@ -62,6 +62,8 @@ def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # A shell starts background jobs, and so perhaps these tests, with SIGINT ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 
@@ -70,6 +72,13 @@ def run(folder: Path, *arguments: str) -> tuple[int, str, str]:
     process = start(folder, *arguments)
     out, err = process.communicate(timeout=120)
     return process.returncode, out, err
+
+
+def running(group: int) -> list[str]:
+    """Processes of a group that have not ended; one that ended may still wait to be noticed."""
+    listed = subprocess.run(["ps", "-eo", "pgid=,stat=,args="], capture_output=True, text=True)
+    rows = [line.split(maxsplit=2) for line in listed.stdout.splitlines()]
+    return [row[2] for row in rows if row[0] == str(group) and not row[1].startswith("Z")]
 
 
 def tables(folder: Path, study: str) -> dict[str, bytes]:
@@ -88,10 +97,10 @@ def test_tables_do_not_depend_on_workers_order_or_repetition(tmp_path: Path) -> 
     one.mkdir()
     two.mkdir()
     status, out, err = run(one, "-m", "dt=0.5,1.0", "actions=2,3", "study=s", "workers=2")
-    assert (status, err) == (0, "")
+    assert status == 0, err
     assert "4 points: 0 done, 4 to run" in out
     status, out, err = run(two, "-m", "actions=3,2,3", "dt=1,0.5", "study=s", "workers=1")
-    assert (status, err) == (0, "")
+    assert status == 0, err
     assert "2 of 6 combinations repeat others" in out
     assert "4 points: 0 done, 4 to run" in out
     assert tables(one, "s") == tables(two, "s")
@@ -133,8 +142,7 @@ def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(
     wrong = faulty(tmp_path)
     process = start(tmp_path, "-m", *wrong, "+system.fault=none,hang", "workers=2")
     points = tmp_path / "results" / "points"
-    end = time.monotonic() + 60
-    while not list(points.glob("*/record.json")) and time.monotonic() < end:
+    while not list(points.glob("*/record.json")) and process.poll() is None:
         time.sleep(0.1)
     if stop is signal.SIGINT:
         os.killpg(process.pid, stop)  # as a terminal does, workers included
@@ -144,8 +152,7 @@ def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(
     assert process.returncode == 130
     assert "stopped; what has finished is kept" in err
     assert "Traceback" not in err
-    with pytest.raises(ProcessLookupError):
-        os.killpg(process.pid, 0)
+    assert running(process.pid) == []
     status, out, _ = run(tmp_path, "-m", *wrong, "+system.fault=none")
     assert status == 0
     assert "1 points: 1 done, 0 to run" in out
