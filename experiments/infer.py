@@ -28,12 +28,14 @@ from experiments.tables import csv_bytes
 from experiments.task import plain_tree, results_folder
 from mlci.demonstrations import Demonstration
 from mlci.maxent import expected_violations
-from mlci.mdp import action_grid, discretize, step_count
+from mlci.mdp import action_grid, discretize
 from mlci.metrics import diagnose
 from mlci.recordings import Problem, read_demonstrations
 from mlci.spaces import Bools
 from paper_figures import hypothesis_map
 from paper_figures.style import save
+
+_UNEVEN = 1e-3  # of a time step: how far a duration may be off, for times that were rounded
 
 
 def main() -> int:
@@ -120,20 +122,16 @@ def _usable(
     used, steps = [], []
     for shown in read:
         duration = shown.task.horizon
-        if settings.round_horizon:
-            steps.append(max(1, round(duration / settings.dt)))
-        else:
-            try:
-                steps.append(step_count(duration, settings.dt))
-            except ValueError:
-                problems.append(
-                    Problem(
-                        shown.name,
-                        f"dt = {settings.dt:g} s does not cut its {duration:g} s into whole steps: "
-                        "choose another dt, or set round_horizon=true",
-                    )
-                )
-                continue
+        count = round(duration / settings.dt)
+        off = abs(count * settings.dt - duration)
+        if not settings.round_horizon and (count < 1 or off > _UNEVEN * settings.dt):
+            message = (
+                f"dt = {settings.dt:g} s does not cut its {duration:g} s into whole steps: choose "
+                "another dt, or set round_horizon=true"
+            )
+            problems.append(Problem(shown.name, message))
+            continue
+        steps.append(max(1, count))
         used.append(shown)
     return used, steps, problems
 

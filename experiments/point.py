@@ -13,13 +13,13 @@ from experiments.settings import Settings
 from experiments.stages import demonstrations
 from experiments.store import Store
 from mlci.maxent import expected_violations, log_partition, sample_moves, violation_probabilities
-from mlci.mdp import action_grid, discretize, forbid, step_count
+from mlci.mdp import action_grid, discretize, forbid
 from mlci.metrics import (
     diagnose,
     final_state_error,
     violation_distance,
 )
-from mlci.simulate import rollout
+from mlci.simulate import rollout, step_count
 
 # Random streams beside those of the trials, whose keys have one entry: see sample_trials.
 _ROLLOUTS, _SUBSETS = 0, 1

@@ -12,12 +12,12 @@ from types import ModuleType
 
 import numpy as np
 
-import mlci.demonstrations
+import mlci.demonstrator
 import mlci.reachability
 import mlci.safety_filter
 from experiments.settings import Settings
 from experiments.store import Store
-from mlci.demonstrations import Outcome, demonstrate, sample_trials
+from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.reachability import SafeSet, solve
 from mlci.safety_filter import SafetyFilter, border_margin
@@ -126,7 +126,7 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
         settings.horizon,
         settings.seed,
     )
-    modules = [mlci.demonstrations, mlci.safety_filter, sys.modules[__name__]]
+    modules = [mlci.demonstrator, mlci.safety_filter, sys.modules[__name__]]
     return TrialSet(**store.get("demonstrations", depends, modules, compute))
 
 

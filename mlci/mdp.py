@@ -193,18 +193,6 @@ def forbid(mdp: TabularMDP, regions: ArrayLike) -> TabularMDP:
     return replace(mdp, allowed=mdp.allowed & ~crossed)
 
 
-def step_count(horizon: float, dt: float) -> int:
-    """T = horizon / dt, the number of transitions.
-
-    Raises:
-        ValueError: dt does not divide the horizon (to 1e-9 of a step).
-    """
-    steps = round(horizon / dt)
-    if steps < 1 or abs(steps * dt - horizon) > 1e-9 * dt:
-        raise ValueError(f"a time step of {dt} s does not divide the horizon of {horizon} s")
-    return steps
-
-
 def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int:
     """Integrator steps a move, so that chords stay close to the curve they stand for.
 

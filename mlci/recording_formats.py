@@ -1,6 +1,6 @@
 """File formats of recorded demonstrations.
 
-Formats, told apart by suffix and by the first line:
+They are told apart by suffix, and the two kinds of CSV by the first line:
 
 * `.csv` with a header: a column `time` [s], one for each state dimension by its name, and
   optionally `control_1` to `control_m`; one line a sample. Other columns are ignored.
@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import csv
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,9 @@ import numpy as np
 
 from mlci.spaces import Floats
 from mlci.systems import System
+
+# What numpy and pyarrow raise for damaged files.
+_BROKEN = (ValueError, TypeError, OSError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +112,7 @@ def _read_npz(file: Path, system: System, dt: float) -> Recording:
         # numpy leaves a file of its own open where it is no archive.
         with file.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             arrays = {key: np.asarray(archive[key], dtype=float) for key in archive.files}
-    except (zipfile.BadZipFile, ValueError, EOFError, TypeError) as error:
+    except _BROKEN as error:
         raise ValueError(f"is not an archive of numeric arrays ({error})") from None
     n, states = system.space.dimension, arrays.get("states")
     if states is None or states.ndim != 2 or states.shape[1] != n:
@@ -133,7 +137,10 @@ def _read_parquet(file: Path, system: System, dt: float) -> Recording:
         from pyarrow import parquet
     except ImportError:
         raise ValueError("reading .parquet needs pyarrow: pip install 'mlci[parquet]'") from None
-    data = parquet.read_table(file)
+    try:
+        data = parquet.read_table(file)
+    except _BROKEN as error:
+        raise ValueError(f"is not a parquet table ({error})") from None
     columns = _chosen(data.column_names, system)
     try:
         table = np.column_stack(

@@ -74,7 +74,7 @@ def read_demonstrations(
                 _demonstration(name, recording, system.space, start, goal, tolerance)
             )
         except (ValueError, OSError) as error:
-            problems.append(Problem(str(file), str(error)))
+            problems.append(Problem(str(file), " ".join(str(error).split())))
     return demonstrations, problems
 
 

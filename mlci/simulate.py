@@ -13,6 +13,18 @@ from mlci.systems import System
 Step = Callable[[System, Floats, Floats, float], Floats]
 
 
+def step_count(horizon: float, dt: float) -> int:
+    """T = horizon / dt, the number of transitions.
+
+    Raises:
+        ValueError: dt does not divide the horizon (to 1e-9 of a step).
+    """
+    steps = round(horizon / dt)
+    if steps < 1 or abs(steps * dt - horizon) > 1e-9 * dt:
+        raise ValueError(f"a time step of {dt} s does not divide the horizon of {horizon} s")
+    return steps
+
+
 def euler_step(system: System, states: Floats, controls: Floats, dt: float) -> Floats:
     """One explicit Euler step: states (..., n) after dt [s], first order."""
     return states + dt * system.dynamics(states, controls)

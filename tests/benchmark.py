@@ -21,7 +21,7 @@ import numpy as np
 import scipy
 
 from mlci.constraints import ConstraintSet
-from mlci.demonstrations import demonstrate, sample_trials
+from mlci.demonstrator import demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.maxent import log_partition, policy, violation_probabilities
 from mlci.mdp import TabularMDP, action_grid, discretize, substep_count

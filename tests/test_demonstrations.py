@@ -4,15 +4,8 @@ import numpy as np
 import pytest
 
 from mlci.constraints import ConstraintSet
-from mlci.demonstrations import (
-    Demonstration,
-    Outcome,
-    Task,
-    Trial,
-    demonstrate,
-    enters,
-    sample_trials,
-)
+from mlci.demonstrations import Demonstration, Task
+from mlci.demonstrator import Outcome, Trial, demonstrate, enters, sample_trials
 from mlci.grids import Grid
 from mlci.ilqr import optimize
 from mlci.reachability import solve

@@ -12,7 +12,8 @@ import pandas as pd
 import pytest
 
 from mlci.constraints import ConstraintSet
-from mlci.demonstrations import Demonstration, Outcome, demonstrate, sample_trials
+from mlci.demonstrations import Demonstration
+from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.reachability import solve
 from mlci.recordings import write_demonstration

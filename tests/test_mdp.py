@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from mlci.constraints import ConstraintSet
 from mlci.grids import Grid
 from mlci.maxent import log_partition, violation_probabilities
-from mlci.mdp import TabularMDP, action_grid, discretize, forbid, step_count
+from mlci.mdp import TabularMDP, action_grid, discretize, forbid
 from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator, Pendulum, System
 
@@ -158,12 +158,6 @@ def test_action_grid_spans_the_control_box() -> None:
         action_grid(Pendulum(), 0)
     with pytest.raises(ValueError, match="counts of at least 1, not"):
         action_grid(Pendulum(), [3, 3])
-
-
-def test_step_count_refuses_a_step_that_does_not_divide() -> None:
-    assert step_count(5.0, 0.1) == 50
-    with pytest.raises(ValueError, match="does not divide the horizon"):
-        step_count(5.0, 0.3)
 
 
 def test_errors_print_the_shapes() -> None:

@@ -98,6 +98,7 @@ def test_parquet(tmp_path, swing):
         pyarrow.table(dict(zip(names, columns, strict=True))), tmp_path / "a.parquet"
     )
     assert_same(read_one(tmp_path / "a.parquet"), swing, controls=False)
+    assert "is not a parquet table" in problem_with(tmp_path / "b.parquet", "no table")
 
 
 def test_parquet_without_its_package_says_what_to_install(tmp_path, monkeypatch):

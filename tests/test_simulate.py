@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mlci.simulate import euler_step, rk4_step, rollout
+from mlci.simulate import euler_step, rk4_step, rollout, step_count
 from mlci.systems import Pendulum
 
 PENDULUM = Pendulum()
@@ -61,3 +61,9 @@ def test_a_winding_path_is_not_wrapped():
 
 def test_no_controls_make_a_path_of_one_state():
     np.testing.assert_array_equal(rollout(PENDULUM, START, np.empty((0, 1)), HOLD), [START])
+
+
+def test_step_count_refuses_a_step_that_does_not_divide() -> None:
+    assert step_count(5.0, 0.1) == 50
+    with pytest.raises(ValueError, match="does not divide the horizon"):
+        step_count(5.0, 0.3)

@@ -1,0 +1,214 @@
+"""A simulated demonstrator who moves optimally and keeps out of the truth (section V-B).
+
+Trial i of a study draws its task and the first guesses of its restarts from a generator of its own,
+so it is the same whatever the number of trials.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from mlci.constraints import ConstraintSet
+from mlci.demonstrations import REACHED, Demonstration, Task
+from mlci.ilqr import ControlFilter, optimize
+from mlci.reachability import SafeSet
+from mlci.simulate import rollout, step_count
+from mlci.spaces import Bools, Box, Floats
+from mlci.systems import System
+
+_DRAWS = 10_000  # attempts to find a safe state before the start box counts as unsafe
+_POINTS_BETWEEN = 10  # points between two samples at which the truth is looked for
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A task and the first guesses from which the demonstrator tries it.
+
+    Attributes:
+        task: the task.
+        guesses: (R, K, m) one control sequence a restart.
+
+    Raises:
+        ValueError: guesses that are empty or do not have three axes.
+    """
+
+    task: Task
+    guesses: Floats
+
+    def __post_init__(self) -> None:
+        if self.guesses.ndim != 3 or not self.guesses.size:
+            raise ValueError(f"a trial needs guesses (R, K, m), not {self.guesses.shape}")
+
+
+class Outcome(StrEnum):
+    """What became of a trial; where several reasons hold, the first of this list is named."""
+
+    TRUTH_ENTERED = "truth_entered"
+    BOUNDS_LEFT = "bounds_left"
+    GOAL_MISSED = "goal_missed"
+    KEPT = "kept"
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """The best restart of a trial.
+
+    Attributes:
+        demonstration: the path, whether it was kept or not.
+        outcome: kept, or why not.
+        cost: the optimiser's cost, effort and goal penalty.
+        miss: distance of the last state from the goal, Euclidean in raw units, wrapped.
+        restart: which first guess led to it.
+    """
+
+    demonstration: Demonstration
+    outcome: Outcome
+    cost: float
+    miss: float
+    restart: int
+
+
+def sample_trials(
+    system: System,
+    safe_set: SafeSet | None,
+    start_box: Box,
+    *,
+    trials: int,
+    seed: int,
+    horizon: float,
+    dt: float,
+    margin: float = 0.0,
+    goal_offsets: Box | None = None,
+    restarts: int = 3,
+    hold: float = 0.5,
+) -> list[Trial]:
+    """Draw tasks, uniformly among safe starts and goals, and first guesses for them.
+
+    A guess holds each control for `hold`, uniform in the control box: noise that changed with
+    every sample would average out, and all restarts would follow the same path.
+
+    Args:
+        safe_set: starts and goals are drawn anew until they lie in it; None allows all.
+        start_box: finite box of starts and goals.
+        trials: number of trials.
+        seed: of the study; trial i depends on it and on i only.
+        horizon: duration of a task [s].
+        dt: sampling time [s], which divides the horizon.
+        margin: V that starts and goals must have at least.
+        goal_offsets: the goal region, relative to the goal state that was drawn; None for a point.
+        restarts: R, guesses for each trial.
+        hold: time for which a guess holds a control [s].
+
+    Raises:
+        ValueError: a horizon that dt does not divide, or a start box with no safe state.
+    """
+    steps = step_count(horizon, dt)
+    n, m = system.space.dimension, system.control_box.dimension
+    if start_box.dimension != n or not np.all(np.isfinite(start_box.widths)):
+        raise ValueError(f"a start box needs {n} finite sides: {start_box}")
+    offsets = Box.point(np.zeros(n)) if goal_offsets is None else goal_offsets
+    per_hold = max(1, round(hold / dt))
+    drawn = []
+    for trial in range(trials):
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
+        start = _draw_safe(rng, start_box, safe_set, margin)
+        goal = _draw_safe(rng, start_box, safe_set, margin)
+        low, high = system.control_box.lower, system.control_box.upper
+        levels = rng.uniform(low, high, size=(restarts, -(-steps // per_hold), m))
+        guesses = np.repeat(levels, per_hold, axis=1)[:, :steps]
+        task = Task(start, Box(goal + offsets.lower, goal + offsets.upper), horizon)
+        drawn.append(Trial(task, guesses))
+    return drawn
+
+
+def demonstrate(
+    system: System,
+    trials: Sequence[Trial],
+    truth: ConstraintSet | None,
+    safety_filter: ControlFilter | None,
+    *,
+    dt: float,
+    goal_weight: float = 300.0,
+    iterations: int = 10,
+    goal_tolerance: float = REACHED,
+) -> list[Attempt]:
+    """Let the demonstrator try every trial: equation (8) from each guess, of which the best counts.
+
+    The best restart is the cheapest that could be kept; if none could, the cheapest.
+
+    Args:
+        trials: at least one; all with guesses of one shape.
+        truth: the regions that the demonstrator may not enter.
+        safety_filter: keeps it out of them; None lets it go anywhere.
+        dt: sampling time [s].
+        goal_weight: price of the squared terminal error.
+        iterations: of the optimiser.
+        goal_tolerance: largest distance from the goal that counts as reached, in raw units.
+
+    Returns:
+        One attempt a trial, in their order.
+    """
+    tasks, restarts = [trial.task for trial in trials], len(trials[0].guesses)
+    solution = optimize(
+        system,
+        np.repeat([task.start for task in tasks], restarts, axis=0),
+        np.repeat([task.goal.lower for task in tasks], restarts, axis=0),
+        np.repeat([task.goal.upper for task in tasks], restarts, axis=0),
+        np.concatenate([trial.guesses for trial in trials]),
+        dt,
+        goal_weight=goal_weight,
+        iterations=iterations,
+        safety_filter=safety_filter,
+    )
+    entered = np.zeros(len(solution.states), dtype=bool)
+    if truth is not None:
+        entered = enters(system, truth, solution.states, solution.controls, dt)
+    left = ~np.all(system.space.contains(solution.states), axis=-1)
+    attempts = []
+    for number, task in enumerate(tasks):
+        own = np.arange(number * restarts, (number + 1) * restarts)
+        misses = np.linalg.norm(system.space.excess(solution.states[own, -1], task.goal), axis=-1)
+        failures = np.array([entered[own], left[own], ~(misses <= goal_tolerance)])
+        best = int(np.lexsort([solution.cost[own], failures.any(axis=0)])[0])
+        outcome = list(Outcome)[int(np.argmax([*failures[:, best], True]))]
+        path, controls = solution.states[own[best]], solution.controls[own[best]]
+        demonstration = Demonstration(task, path, controls, dt, f"trial_{number:03d}")
+        cost = float(solution.cost[own[best]])
+        attempts.append(Attempt(demonstration, outcome, cost, float(misses[best]), best))
+    return attempts
+
+
+def enters(
+    system: System, truth: ConstraintSet, states: Floats, controls: Floats, dt: float
+) -> Bools:
+    """Which paths (B,) enter a region of the truth.
+
+    Looked for on the straight lines between samples, and at ten points between samples of the
+    motion that the held control makes.
+
+    Args:
+        states: (B, K+1, n) paths.
+        controls: (B, K, m) controls that were applied.
+        dt: time between samples [s].
+    """
+    on_lines = np.any(truth.violated_by(states), axis=-1)
+    motion = rollout(system, states[:, :-1], controls[:, :, None], dt, _POINTS_BETWEEN + 1)
+    return np.asarray(on_lines | np.any(truth.signed_distance(motion) < 0, axis=(1, 2)))
+
+
+def _draw_safe(
+    rng: np.random.Generator, box: Box, safe_set: SafeSet | None, margin: float
+) -> Floats:
+    """A state (n,), uniform in the part of a box that is safe."""
+    for _ in range(_DRAWS):
+        state = rng.uniform(box.lower, box.upper)
+        if safe_set is None or safe_set.contains(state, margin):
+            return state
+    raise ValueError(
+        f"none of {_DRAWS} states drawn from {box} has V >= {margin}: choose a start box that "
+        "meets the safe set"
+    )
