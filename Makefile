@@ -7,11 +7,13 @@ READY := .venv/ready
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-paper: $(READY) ## run the paper's whole sweep and write its tables
+paper: $(READY) ## run the paper's whole sweep, write its tables and draw them
 	$(BIN)/python experiments/run.py -m experiment=paper
+	$(BIN)/python -m paper_figures paper
 
 smoke: $(READY) ## run every study once, tiny, in seconds
 	$(BIN)/python experiments/run.py -m experiment=smoke
+	$(BIN)/python -m paper_figures smoke
 
 test: $(READY) ## run the tests
 	$(BIN)/python -m pytest

@@ -88,10 +88,7 @@ def _collect(futures: dict[Future[Any], tuple[str, ...]]) -> dict[tuple[str, ...
     returns: dict[tuple[str, ...], JobReturn] = {}
     failures = 0
     terminal = sys.stderr.isatty()
-    shape = (
-        "{percentage:3.0f}%|{bar}| {n}/{total} points, {elapsed} gone, {remaining} left{postfix}"
-    )
-    with tqdm(total=len(futures), bar_format=shape, disable=not terminal) as bar:
+    with tqdm(total=len(futures), bar_format=_BAR, disable=not terminal) as bar:
         for future in as_completed(futures):
             job = futures[future]
             error = future.exception()

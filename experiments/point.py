@@ -20,6 +20,7 @@ from mlci.metrics import (
     violation_distance,
 )
 from mlci.simulate import rollout, step_count
+from mlci.spaces import Floats
 
 # Random streams beside those of the trials, whose keys have one entry: see sample_trials.
 _ROLLOUTS, _SUBSETS = 0, 1
@@ -85,9 +86,11 @@ def run_point(
     feasible = ~np.isnan(error)
 
     violated = hypotheses.violated_by(trials.states[kept])
-    distance = violation_distance(phi_truth[feasible], violated[feasible])
     each, floor = np.full((2, len(kept)), np.nan)
-    each[feasible], floor[feasible] = distance.each, distance.floor
+    pooled = np.nan
+    if feasible.any():
+        distance = violation_distance(phi_truth[feasible], violated[feasible])
+        each[feasible], floor[feasible], pooled = distance.each, distance.floor, distance.pooled
 
     tables = {
         "trials": pd.DataFrame(
@@ -113,10 +116,10 @@ def run_point(
                     "demonstrations": len(kept),
                     "reachable": int(np.sum(reachable)),
                     "feasible": int(np.sum(feasible)),
-                    "final_state_error": np.nanmean(error) if feasible.any() else np.nan,
-                    "violation_distance": np.mean(distance.each) if feasible.any() else np.nan,
-                    "violation_floor": np.mean(distance.floor) if feasible.any() else np.nan,
-                    "violation_distance_pooled": distance.pooled if feasible.any() else np.nan,
+                    "final_state_error": _mean(error[feasible]),
+                    "violation_distance": _mean(each[feasible]),
+                    "violation_floor": _mean(floor[feasible]),
+                    "violation_distance_pooled": pooled,
                     "stay": diagnosis.stay,
                     "leave": diagnosis.leave,
                     "cells_crossed": diagnosis.cells_crossed,
@@ -140,3 +143,8 @@ def run_point(
 def _stream(seed: int, purpose: int, index: int) -> np.random.Generator:
     """A generator of its own for one purpose and one trial."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(purpose, int(index))))
+
+
+def _mean(values: Floats) -> float:
+    """The mean, NaN of nothing."""
+    return float(np.mean(values)) if len(values) else np.nan

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import logsumexp
-from scipy.stats import rankdata
 
 from mlci.spaces import Bools, Floats, Ints
 
@@ -49,8 +48,14 @@ def log_likelihood_gain(phi: ArrayLike) -> Floats:
 
 def rank_scores(gain: ArrayLike, feasible: ArrayLike) -> Floats:
     """Ranks (..., C), 1 for the largest gain; ties share their mean rank, infeasible ones last."""
-    score = np.where(feasible, gain, -np.inf)
-    return np.asarray(rankdata(-score, method="average", axis=-1))
+    loss = -np.where(feasible, gain, -np.inf)
+    rank = np.empty(loss.shape)
+    for row in np.ndindex(loss.shape[:-1]):
+        ordered = np.sort(loss[row])
+        better = np.searchsorted(ordered, loss[row], side="left")
+        up_to_ties = np.searchsorted(ordered, loss[row], side="right")
+        rank[row] = (better + 1 + up_to_ties) / 2
+    return rank
 
 
 def rank_constraints(

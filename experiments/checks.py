@@ -1,0 +1,218 @@
+"""What can be wrong with settings beyond their types: ranges, shapes and regions.
+
+Each check yields a line for each fault: the key, the value and the way out. Checks that look at the
+system rely on those that come before them in `experiments.config`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from experiments.settings import (
+    ModelSettings,
+    RecordedSettings,
+    Region,
+    Settings,
+    StudySettings,
+)
+from mlci.spaces import StateSpace
+
+_MOST_STEPS = 100_000
+_MOST_COUNT = 1_000_000  # of trials, rollouts and the like
+_MOST_ENTRIES = 100_000_000  # of one array of the tabular model: about 1 GB each
+
+_POSITIVE = (
+    "horizon",
+    "dt",
+    "temperature",
+    "demonstrations.dt",
+    "demonstrations.goal_tolerance",
+    "demonstrations.goal_weight",
+    "demonstrations.hold",
+)
+_NOT_NEGATIVE = ("seed", "safety.margin", "safety.width")
+_AT_LEAST_ONE = (
+    "rollouts",
+    "transition.samples",
+    "demonstrations.pairs",
+    "demonstrations.keep",
+    "demonstrations.restarts",
+    "demonstrations.iterations",
+    "ranks.demonstrations",
+    "ranks.subsets",
+    "ranks.top",
+    "grid.shape",
+    "safety.shape",
+    "hypotheses.shape",
+    "actions",
+)
+
+
+def study_problems(study: StudySettings) -> Iterator[str]:
+    """What is out of range in the settings that change no result."""
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", study.study) or study.study in ("points", "store"):
+        yield (
+            f"study: {study.study!r} cannot name a folder of results; use letters, digits, - and _ "
+            "(points and store are taken)"
+        )
+    if study.workers is not None and study.workers < 1:
+        yield f"workers: {study.workers} must be at least 1; null takes one process a core"
+
+
+def number_problems(settings: ModelSettings) -> Iterator[str]:
+    """What is out of range without looking at the system."""
+    yield from _limit(settings, _POSITIVE, lambda value: value > 0, "must be above 0")
+    yield from _limit(settings, _NOT_NEGATIVE, lambda value: value >= 0, "must not be below 0")
+    yield from _limit(settings, _AT_LEAST_ONE, lambda value: value >= 1, "must be at least 1")
+    yield from _limit(
+        settings, _AT_LEAST_ONE, lambda value: value <= _MOST_COUNT, f"is above {_MOST_COUNT}"
+    )
+    if not 0 < settings.inference.prior < 1:
+        yield f"inference.prior: {settings.inference.prior} must lie between 0 and 1, ends excluded"
+
+
+def count_problems(settings: Settings) -> Iterator[str]:
+    """Numbers of a study that do not go together."""
+    demonstrations = settings.demonstrations
+    if demonstrations.keep > demonstrations.pairs:
+        yield (
+            f"demonstrations.keep: {demonstrations.keep} is more than the {demonstrations.pairs} "
+            "of demonstrations.pairs; lower it, or raise pairs"
+        )
+    for key, dt in (("dt", settings.dt), ("demonstrations.dt", demonstrations.dt)):
+        if dt > 0 and settings.horizon > 0:
+            yield from _division_problems(key, dt, settings.horizon)
+
+
+def _limit(
+    settings: ModelSettings, keys: tuple[str, ...], holds: Callable[[Any], bool], rule: str
+) -> Iterator[str]:
+    """A message for each key whose value, or an entry of it, breaks a rule."""
+    for key in keys:
+        value: Any = settings
+        for part in key.split("."):
+            value = getattr(value, part, None)  # not every kind of settings has every key
+        if value == ():
+            yield f"{key}: [] is empty; give a number for each dimension"
+        entries = value if isinstance(value, tuple) else (value,)
+        if not all(entry is None or holds(entry) for entry in entries):
+            yield f"{key}: {list(value) if isinstance(value, tuple) else value} {rule}"
+
+
+def _division_problems(key: str, dt: float, horizon: float) -> Iterator[str]:
+    """The horizon has to be a whole number of steps."""
+    steps = horizon / dt
+    if steps > _MOST_STEPS:
+        yield f"{key}: {dt} cuts the horizon {horizon} into more than {_MOST_STEPS} steps; raise it"
+    elif round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+        below = (horizon / count for count in range(math.floor(steps) + 1, 2 * _MOST_STEPS))
+        above = (horizon / count for count in range(math.floor(steps), 0, -1))
+        near = [next(filter(_is_short, values), None) for values in (below, above)]
+        ways = " or ".join(f"{value:.4g}" for value in near if value is not None)
+        yield f"{key}: {dt} does not cut the horizon {horizon} into whole steps; try {ways}"
+
+
+def _is_short(value: float) -> bool:
+    """Whether four digits write a number exactly, as far as a whole number of steps needs it."""
+    return math.isclose(float(f"{value:.4g}"), value, rel_tol=1e-12)
+
+
+def shape_problems(settings: ModelSettings) -> Iterator[str]:
+    """What does not match the system's dimensions and bounds."""
+    space, controls = settings.model.space, settings.model.control_box.dimension
+    for key, shape in (
+        ("grid.shape", settings.grid.shape),
+        ("hypotheses.shape", settings.hypotheses.shape),
+    ):
+        if shape is not None:
+            yield from _length_problems(key, shape, space)
+    if not isinstance(settings.actions, int) and len(settings.actions) != controls:
+        yield f"actions: {list(settings.actions)} must be one number, or a list of {controls}"
+    for i, region in enumerate(settings.hypotheses.boxes):
+        yield from _region_problems(f"hypotheses.boxes[{i}]", region, space)
+    if settings.hypotheses.shape is None and not settings.hypotheses.boxes:
+        yield "hypotheses: no shape and no boxes; give a shape, for a grid of cells, or boxes"
+
+
+def truth_shape_problems(settings: Settings) -> Iterator[str]:
+    """What a study has of regions beside the hypotheses."""
+    space = settings.model.space
+    yield from _length_problems("safety.shape", settings.safety.shape, space)
+    yield from _region_problems("tasks", settings.tasks, space)
+    for i, region in enumerate(settings.truth.boxes):
+        yield from _region_problems(f"truth.boxes[{i}]", region, space)
+    if not settings.truth.boxes:
+        yield "truth.boxes: [] is empty; give at least one box, with lower and upper"
+
+
+def task_problems(settings: RecordedSettings) -> Iterator[str]:
+    """A start or goal that does not fit the state space."""
+    space = settings.model.space
+    if settings.start is not None:
+        yield from _length_problems("start", settings.start, space)
+    if settings.goal is not None:
+        yield from _region_problems("goal", settings.goal, space, point=True)
+
+
+def _length_problems(key: str, entries: tuple[Any, ...], space: StateSpace) -> Iterator[str]:
+    """A list must have an entry for each dimension of the state space."""
+    if len(entries) != space.dimension:
+        names = ", ".join(space.names)
+        yield f"{key}: {list(entries)} must have {space.dimension} entries, one each for {names}"
+
+
+def _region_problems(
+    key: str, region: Region, space: StateSpace, point: bool = False
+) -> Iterator[str]:
+    """A box must match the state space, be ordered and lie inside; some may be a `point`."""
+    if len(region.lower) != space.dimension or len(region.upper) != space.dimension:
+        yield from _length_problems(f"{key}.lower", region.lower, space)
+        yield from _length_problems(f"{key}.upper", region.upper, space)
+        return
+    for d, (low, high) in enumerate(zip(region.lower, region.upper, strict=True)):
+        name, first, last = space.names[d], space.bounds.lower[d], space.bounds.upper[d]
+        if low is None and high is None:
+            continue
+        if low is None or high is None:
+            yield f"{key}: {name} has one side only; give both ends, or null twice to leave it free"
+        elif low > high or (low == high and not point):
+            yield f"{key}: {name} goes from {low} to {high}; lower must be below upper"
+        elif space.periodic[d] and high - low > (last - first) * (1 + 1e-12):
+            yield f"{key}: {name} from {low:.6g} to {high:.6g} is over a whole turn; use null twice"
+        elif not space.periodic[d] and (low < first or high > last):
+            yield (
+                f"{key}: {name} from {low:.6g} to {high:.6g} leaves the state space "
+                f"[{first:.6g}, {last:.6g}]; move it inside, or choose another {key.split('.')[0]}"
+            )
+
+
+def size_problems(settings: ModelSettings) -> Iterator[str]:
+    """What is too large to hold."""
+    n = settings.model.space.dimension
+    moves = math.prod(settings.action_counts) * settings.transition.samples**n
+    hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
+    hypotheses += len(settings.hypotheses.boxes)
+    for key, size, what in (
+        ("grid.shape", math.prod(settings.grid.shape) * moves, "transitions"),
+        ("hypotheses.shape", hypotheses * math.prod(settings.grid.shape), "probabilities"),
+    ):
+        if size > _MOST_ENTRIES:
+            value = list(getattr(settings, key.split(".")[0]).shape or ())
+            yield f"{key}: {value} makes {size:.2g} {what}, over {_MOST_ENTRIES:.0e}; use fewer"
+            return
+
+
+def truth_problems(settings: Settings) -> Iterator[str]:
+    """A value grid that is too large, and a truth that no hypothesis stands for."""
+    if math.prod(settings.safety.shape) > _MOST_ENTRIES:
+        yield f"safety.shape: {list(settings.safety.shape)} makes too many values; use fewer"
+    if not np.any(settings.candidates.inside(settings.constraint)):
+        yield (
+            f"truth: {settings.truth.name} covers no hypothesis entirely, so none can be ranked as "
+            "the truth; choose boxes that hold a whole cell of hypotheses.shape, or refine that"
+        )
