@@ -1,5 +1,6 @@
 """Sweeps as a user runs them: parallel, resumed, failing and stopped."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -76,9 +77,22 @@ def run(folder: Path, *arguments: str) -> tuple[int, str, str]:
 
 def running(group: int) -> list[str]:
     """Processes of a group that have not ended; one that ended may still wait to be noticed."""
-    listed = subprocess.run(["ps", "-eo", "pgid=,stat=,args="], capture_output=True, text=True)
-    rows = [line.split(maxsplit=2) for line in listed.stdout.splitlines()]
-    return [row[2] for row in rows if row[0] == str(group) and not row[1].startswith("Z")]
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # it ended between listing and reading
+            name, _, rest = path.read_text().rpartition(") ")
+            state, _, its_group = rest.split()[:3]
+            if its_group == str(group) and state not in "ZX":
+                found.append(name)
+    return found
+
+
+def gone(group: int, patience: float = 2.0) -> bool:
+    """Whether no process of a group is left, within some seconds."""
+    deadline = time.monotonic() + patience
+    while running(group) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return not running(group)
 
 
 def tables(folder: Path, study: str) -> dict[str, bytes]:
@@ -141,6 +155,7 @@ def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(
 ) -> None:
     wrong = faulty(tmp_path)
     process = start(tmp_path, "-m", *wrong, "+system.fault=none,hang", "workers=2")
+    assert running(process.pid)
     points = tmp_path / "results" / "points"
     while not list(points.glob("*/record.json")) and process.poll() is None:
         time.sleep(0.1)
@@ -152,7 +167,7 @@ def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(
     assert process.returncode == 130
     assert "stopped; what has finished is kept" in err
     assert "Traceback" not in err
-    assert running(process.pid) == []
+    assert gone(process.pid)
     status, out, _ = run(tmp_path, "-m", *wrong, "+system.fault=none")
     assert status == 0
     assert "1 points: 1 done, 0 to run" in out
