@@ -26,14 +26,15 @@ def draw(
             each dimension d; optionally `covered_by_truth`.
         paths: the demonstrations: demonstration, and a column for each dimension.
         dimensions: name, unit, lower, upper and periodic of each dimension of the state. The
-            first two that hypotheses bound are drawn.
+            first two that hypotheses bound are drawn, or, where they bound one, that and another.
         title: above the axes.
     """
-    bounded = [np.isfinite(hypotheses[f"lower_{name}"]).any() for name in dimensions["name"]]
-    x, y = dimensions[bounded].iloc[0], dimensions[bounded].iloc[1]
+    free = [not np.isfinite(hypotheses[f"lower_{name}"]).any() for name in dimensions["name"]]
+    order = np.argsort(free, kind="stable")[:2]
+    x, y = (dimensions.iloc[place] for place in sorted(order))
     figure, axes = new_figure(COLUMN, 3.1)
     with plt.rc_context(RC):
-        boxes = _rectangles(hypotheses, x["name"], y["name"])
+        boxes = _rectangles(hypotheses, x, y)
         feasible = hypotheses["feasible"].to_numpy(dtype=bool)
         gain = hypotheses["gain"].to_numpy(dtype=float)
         finite = gain[feasible & np.isfinite(gain)]
@@ -87,11 +88,17 @@ def draw(
     return figure
 
 
-def _rectangles(hypotheses: pd.DataFrame, x: str, y: str) -> list[Rectangle]:
-    """Each hypothesis in the plane of x and y."""
-    corner = hypotheses[[f"lower_{x}", f"lower_{y}"]].to_numpy()
-    size = hypotheses[[f"upper_{x}", f"upper_{y}"]].to_numpy() - corner
-    return [Rectangle(tuple(a), *b) for a, b in zip(corner, size, strict=True)]
+def _rectangles(hypotheses: pd.DataFrame, x: pd.Series, y: pd.Series) -> list[Rectangle]:
+    """Each hypothesis in the plane of x and y; a free side spans the axis."""
+    corners = [
+        hypotheses[[f"{side}_{x['name']}", f"{side}_{y['name']}"]].to_numpy(dtype=float)
+        for side in ("lower", "upper")
+    ]
+    lower, upper = (
+        np.where(np.isfinite(corner), corner, [x[side], y[side]])
+        for corner, side in zip(corners, ("lower", "upper"), strict=True)
+    )
+    return [Rectangle(tuple(a), *(b - a)) for a, b in zip(lower, upper, strict=True)]
 
 
 def _outline(box: Rectangle, colour: str, width: float) -> Rectangle:

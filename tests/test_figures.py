@@ -89,6 +89,15 @@ def test_hypothesis_map_shows_what_the_table_says() -> None:
     assert axes.get_ylabel() == "speed [rad/s]"
 
 
+def test_hypotheses_over_one_dimension_span_the_other() -> None:
+    table = hypothesis_rows().assign(lower_speed=-np.inf, upper_speed=np.inf)
+    figure = hypothesis_map.draw(table, path_rows(), dimension_rows())
+    outlines = {to_hex(patch.get_edgecolor()): patch for patch in figure.axes[0].patches}
+    truth = outlines[TRUTH]
+    assert truth.get_xy() == pytest.approx((np.pi, -2.0))
+    assert (truth.get_width(), truth.get_height()) == pytest.approx((np.pi, 4.0))
+
+
 def test_a_path_is_broken_where_it_wraps() -> None:
     figure = hypothesis_map.draw(hypothesis_rows(), path_rows(), dimension_rows())
     lines = [line.get_xydata() for line in figure.axes[0].lines if len(line.get_xdata()) > 1]
