@@ -40,7 +40,12 @@ def log_partition(mdp: TabularMDP, start: int, goals: ArrayLike, steps: int) -> 
 
     Returns:
         (T+1, S) log_z; log_z[0, start] is log Z, -inf if no trajectory reaches a goal.
+
+    Raises:
+        ValueError: a start that is no cell, such as the -1 of a state outside the grid.
     """
+    if not 0 <= start < mdp.states:
+        raise ValueError(f"the start must be a cell from 0 to {mdp.states - 1}, not {start}")
     cells = reachable(mdp, start, steps)
     log_z = np.full((steps + 1, mdp.states), -np.inf)
     ends = np.intersect1d(cells[steps], np.atleast_1d(goals))

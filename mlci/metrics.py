@@ -123,7 +123,7 @@ class Diagnosis:
         if found:
             found.append(
                 "remedy: a longer time step, more cells, or start points averaged over the cell "
-                "(transition.samples=3)"
+                "(samples=3)"
             )
         if self.leave > _LEAVE:
             found.append(

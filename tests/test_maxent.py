@@ -144,6 +144,11 @@ def test_an_unreachable_goal_is_refused_not_nan() -> None:
         sample_moves(mdp, log_z, 0, 3, np.random.default_rng(0))
 
 
+def test_a_start_outside_the_grid_is_refused() -> None:
+    with pytest.raises(ValueError, match="a cell from 0 to 5, not -1"):
+        log_partition(toy_mdp(0), -1, [1], 3)
+
+
 def test_sampled_trajectories_follow_the_distribution() -> None:
     """Frequencies against Phi, to four standard errors of 20 000 draws."""
     mdp = toy_mdp(2)
