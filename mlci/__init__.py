@@ -25,4 +25,23 @@ V       values                safe set's value function                  unit of
 ======  ====================  =========================================  ==============
 """
 
+# The public modules; inside them, a name without a leading underscore is public.
+__all__ = [
+    "constraints",
+    "demonstrations",
+    "demonstrator",
+    "grids",
+    "ilqr",
+    "inference",
+    "maxent",
+    "mdp",
+    "metrics",
+    "reachability",
+    "recordings",
+    "safety_filter",
+    "simulate",
+    "spaces",
+    "systems",
+]
+
 __version__ = "0.1.0"
