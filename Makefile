@@ -2,7 +2,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: help paper smoke test lint benchmark lock
+.PHONY: help paper smoke test stress lint benchmark lock
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -11,12 +11,21 @@ paper: $(READY) ## run the paper's whole sweep, write its tables and draw them
 	$(BIN)/python experiments/run.py -m experiment=paper
 	$(BIN)/python -m paper_figures paper
 
-smoke: $(READY) ## run every study once, tiny, in seconds
-	$(BIN)/python experiments/run.py -m experiment=smoke
-	$(BIN)/python -m paper_figures smoke
+smoke: $(READY) ## run and draw every experiment, tiny, in seconds
+	@set -e; for each in $(basename $(notdir $(wildcard conf/experiment/*.yaml))); do \
+		$(BIN)/python experiments/run.py -m experiment=$$each scale=smoke study=smoke_$$each; \
+		$(BIN)/python -m paper_figures smoke_$$each; \
+	done
 
 test: $(READY) ## run the tests
 	$(BIN)/python -m pytest
+
+stress: $(READY) ## run what is too long for the tests: kill storms, fuzzing, SLURM, Hydra 1.4
+	@set -e; for each in $(wildcard tests/stress/*.py) $(wildcard tests/stress/*.sh); do \
+		echo "=== $$each"; start=$$(date +%s); \
+		case $$each in *.py) $(BIN)/python $$each;; *) $$each;; esac; \
+		echo "=== $$each: $$(($$(date +%s) - start)) s"; \
+	done
 
 lint: $(READY) ## check style, formatting and types
 	$(BIN)/ruff check

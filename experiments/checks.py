@@ -26,6 +26,10 @@ _MOST_STEPS = 100_000
 _MOST_COUNT = 1_000_000  # of trials, rollouts and the like
 _MOST_ENTRIES = 100_000_000  # of one array of the tabular model: about 1 GB each
 
+_LONGEST = 1e8  # [s], three years
+_TAKEN = ("points", "store", "diffs", "inference")  # among the folders of results
+_RUNNABLE = ("missing", "failed", "stale")
+
 _POSITIVE = (
     "horizon",
     "dt",
@@ -34,6 +38,7 @@ _POSITIVE = (
     "demonstrations.goal_tolerance",
     "demonstrations.goal_weight",
     "demonstrations.hold",
+    "recorded_dt",
 )
 _NOT_NEGATIVE = ("seed", "safety.margin", "safety.width")
 _AT_LEAST_ONE = (
@@ -50,18 +55,33 @@ _AT_LEAST_ONE = (
     "safety.shape",
     "hypotheses.shape",
     "actions",
+    "top",
 )
 
 
 def study_problems(study: StudySettings) -> Iterator[str]:
     """What is out of range in the settings that change no result."""
-    if not re.fullmatch(r"[A-Za-z0-9_-]+", study.study) or study.study in ("points", "store"):
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", study.study) or study.study in _TAKEN:
         yield (
             f"study: {study.study!r} cannot name a folder of results; use letters, digits, - and _ "
-            "(points and store are taken)"
+            f"({', '.join(_TAKEN)} are taken)"
         )
     if study.workers is not None and study.workers < 1:
         yield f"workers: {study.workers} must be at least 1; null takes one process a core"
+    sweep = study.sweep
+    for state in sweep.only or ():
+        if state not in _RUNNABLE:
+            yield f"sweep.only: {state!r} is none of {', '.join(_RUNNABLE)}"
+    if sweep.only is not None and sweep.force:
+        yield "sweep.force: it runs points in every state; give it without sweep.only"
+    if sweep.limit is not None and sweep.limit < 1:
+        yield f"sweep.limit: {sweep.limit} must be at least 1; null is no limit"
+    if sweep.time_limit is not None and not 0 < sweep.time_limit <= _LONGEST:
+        yield f"sweep.time_limit: {sweep.time_limit} must lie between 0 and {_LONGEST:.0f} s"
+    if sweep.retries < 0:
+        yield f"sweep.retries: {sweep.retries} must not be below 0"
+    if sweep.retries and sweep.fail_fast:
+        yield "sweep.retries: nothing is tried again with sweep.fail_fast; give one of them"
 
 
 def number_problems(settings: ModelSettings) -> Iterator[str]:

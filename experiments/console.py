@@ -75,3 +75,36 @@ def measure_lines(summary: pd.Series, quantiles: pd.DataFrame, top: int) -> Iter
             f"{row['median']:g} (80 % between {row['q10']:g} and {row['q90']:g}), top {top} in "
             f"{row[f'share_top_{top}']:.0%} of random subsets"
         )
+
+
+def table_lines(rows: Sequence[Sequence[object]], width: int | None = None) -> Iterator[str]:
+    """Rows, the first of them the head, in aligned columns.
+
+    Args:
+        rows: equally many cells each; numbers are set to the right.
+        width: of the terminal; columns that do not fit are left out and counted. None takes any.
+    """
+    texts = [[_cell(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*texts, strict=True)]
+    fitting = len(widths)
+    while width is not None and fitting > 1 and sum(widths[:fitting]) + 2 * (fitting - 1) > width:
+        fitting -= 1
+    right = [
+        all(isinstance(cell, int | float | None) for cell in column)
+        for column in zip(*rows[1:], strict=True)
+    ] or [False] * len(widths)
+    for row in texts:
+        cells = [
+            text.rjust(size) if to_right else text.ljust(size)
+            for text, size, to_right in zip(row[:fitting], widths, right, strict=False)
+        ]
+        yield "  ".join(cells).rstrip()
+    if fitting < len(widths):
+        yield f"({', '.join(texts[0][fitting:])}: not shown, the terminal is too narrow)"
+
+
+def _cell(value: object) -> str:
+    """A value in a table for people."""
+    if value is None:
+        return "-"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -14,14 +15,13 @@ from hydra.errors import (
     MissingConfigException,
     OverrideParseException,
 )
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from experiments.config import ConfigError, known_keys
-from experiments.record import CHECKOUT
+from experiments.places import CONF
 from experiments.schema import did_you_mean
-
-CONF = CHECKOUT / "conf"
+from experiments.sweep import Outcome, Planned
 
 
 def explain(error: BaseException) -> str:
@@ -32,22 +32,42 @@ def explain(error: BaseException) -> str:
     """
     if isinstance(error, ConfigError):
         return str(error)
-    if isinstance(error, MissingConfigException) and error.missing_cfg_file:
+    if isinstance(error, MissingConfigException):
+        if error.missing_cfg_file is None:
+            return " ".join(str(error).split())
         group, _, name = error.missing_cfg_file.rpartition("/")
         options = sorted(error.options or (), key=lambda option: (len(option), option))
         known = f"; there are {', '.join(options)}" if options else ""
         return f"{group or 'config'}: there is no {name}{known}"
     if isinstance(error, OverrideParseException):
-        return f"{error.override}: cannot be read as key=value ({_first_line(error)})"
-    if isinstance(error, yaml.YAMLError | UnicodeDecodeError):
-        return _broken_file(error)
-    if isinstance(error, InstantiationException):
+        return f"{_short(error.override)}: cannot be read as key=value ({_first_line(error)})"
+    if isinstance(error, InstantiationException) and error.__cause__:
+        key = str(error).rpartition("full_key: ")[2]  # of the sweeper or the launcher
+        return f"{key}: {_first_line(error.__cause__)}"
+    if not of_config(error):
         raise error
+    if broken := _broken_file():
+        return broken
     if isinstance(error, HydraException | OmegaConfBaseException):
         return _explain_override(error)
-    if _raised_in(error).partition(".")[0] in ("hydra", "omegaconf", "antlr4", "yaml"):
-        return f"the config cannot be composed: {_first_line(error)}"
-    raise error
+    # Neither the file nor the key is known.
+    words = " ".join(_short(word) for word in sys.argv[1:])
+    return f"{words}: the config cannot be composed: {_first_line(error)}"
+
+
+def of_config(error: BaseException) -> bool:
+    """Whether an error was raised while Hydra read and composed the config."""
+    composing = ("hydra", "omegaconf", "antlr4", "yaml")
+    trace, names = error.__traceback__, [""]
+    while trace is not None:
+        names.append(trace.tb_frame.f_globals.get("__name__", ""))
+        trace = trace.tb_next
+    return (
+        isinstance(error, HydraException | OmegaConfBaseException | yaml.YAMLError | UnicodeError)
+        or names[-1].partition(".")[0] in composing
+        # What recurses too deeply, or has too long a name, may be noticed anywhere.
+        or any(re.match(r"hydra\._internal\.(config_|defaults_list)", name) for name in names)
+    )
 
 
 def _explain_override(error: HydraException | OmegaConfBaseException) -> str:
@@ -55,6 +75,8 @@ def _explain_override(error: HydraException | OmegaConfBaseException) -> str:
     if several := re.search(r"Ambiguous value for argument '(.+)'", str(error)):
         key, _, values = several[1].partition("=")
         return f"{key}: several values need -m, for a sweep, or {key}=[{values}], for a list"
+    if re.search(r"Could not (override|delete) ''", str(error)):
+        return f"{' '.join(map(_short, sys.argv[1:]))}: cannot be read as key=value"
     if unknown := re.search(r"Could not override '([^']+)'", str(error)):
         key = unknown[1]
         parent = getattr(error.__cause__, "parent_node", None)
@@ -80,42 +102,61 @@ def job_names(jobs: Sequence[Sequence[str]]) -> list[str]:
     return [" ".join(part for part in job if part not in shared).replace("'", "") for job in jobs]
 
 
-def describe_failures(failed: Mapping[str, Exception], total: int) -> str:
-    """The tracebacks of failed points by name, then a line for each."""
-    texts, lines = [], []
-    for name, error in failed.items():
-        # The pool keeps a worker's traceback as text on the exception.
-        texts.append(f"--- {name}\n{getattr(error, 'traceback', '') or error}".rstrip())
-        lines.append(f"  {name}: {type(error).__name__}: {_first_line(error)}")
-    summary = (
-        f"{len(failed)} of {total} points failed, and no table is written; the others are kept, "
-        "and the same command runs what is missing:"
+def describe_failures(outcome: Outcome, total: int) -> str:
+    """The tracebacks of failed points, equal ones once, then a table with a line for each."""
+    traces: dict[str, list[Planned]] = {}
+    for planned, failure in outcome.failures:
+        traces.setdefault(failure["traceback"].rstrip(), []).append(planned)
+    texts = []
+    for trace, alike in traces.items():
+        more = f" (and {len(alike) - 1} more)" if len(alike) > 1 else ""
+        texts.append(f"--- {alike[0].name}{more}: {alike[0].point.folder / 'log.txt'}")
+        texts += [trace] if trace else []
+    count, left = len(outcome.failures), len(outcome.not_started)
+    width = max(len(planned.name) for planned, _ in outcome.failures)
+    return "\n".join(
+        [
+            *texts,
+            f"{count} of {total} points failed, and no table is written; the others are kept, and "
+            "the same command runs what is missing:",
+            *(
+                f"  {failure['reason']:8}{planned.name:{width}}  {failure['error']}"
+                for planned, failure in outcome.failures
+            ),
+            *([f"{left} points were not started"] if left else []),
+        ]
     )
-    return "\n".join([*texts, summary, *lines])
 
 
 def _first_line(error: BaseException) -> str:
-    """The first line of an error's message."""
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]
+    """The first line of an error's message, or of its cause's."""
+    if lines := str(error).strip().splitlines():
+        return _short(lines[0])
+    return _first_line(error.__cause__) if error.__cause__ else type(error).__name__
 
 
-def _raised_in(error: BaseException) -> str:
-    """Name of the module that raised an error."""
-    trace = error.__traceback__
-    while trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
-    return str(trace.tb_frame.f_globals.get("__name__", "")) if trace else ""
+def _short(text: str) -> str:
+    """A text that leaves room for others on the screen."""
+    return text if len(text) <= 300 else f"{text[:200]} ... {text[-80:]}"
 
 
-def _broken_file(error: Exception) -> str:
-    """Which config file cannot be read, and where."""
-    if mark := getattr(error, "problem_mark", None):
-        return f"{mark.name}, line {mark.line + 1}: not valid YAML ({_first_line(error)})"
+def _broken_file() -> str | None:
+    """Which config file cannot be read, and where; None if all can."""
     named = [Path(word.rpartition("=")[2]) for word in sys.argv[1:]]  # by --config-dir
-    folders = [CONF, *(folder for folder in named if folder.is_dir())]
+    folders = [CONF, *(folder for folder in named if os.path.isdir(folder))]
     for path in sorted(path for folder in folders for path in folder.rglob("*.yaml")):
         try:
-            path.read_text(encoding="utf-8")
+            content = OmegaConf.load(path)
+        except IsADirectoryError:
+            return f"{path}: a folder, not a file"
         except UnicodeDecodeError as found:
             return f"{path}: byte {found.start} is not UTF-8; save the file as UTF-8"
-    return f"a config file cannot be read: {_first_line(error)}"
+        except yaml.YAMLError as found:
+            mark = getattr(found, "problem_mark", None)
+            line = f", line {mark.line + 1}" if mark else ""
+            return f"{path}{line}: not valid YAML ({_first_line(found)})"
+        except Exception as found:
+            return f"{path}: cannot be read ({_first_line(found)})"
+        if not OmegaConf.is_dict(content):
+            return f"{path}: holds a list, not keys with values"
+    return None

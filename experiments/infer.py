@@ -16,14 +16,15 @@ from omegaconf import DictConfig
 
 from experiments.config import ConfigError, read_recorded_config
 from experiments.console import diagnosis_lines, ranking_lines
-from experiments.errors import CONF, explain
+from experiments.errors import explain
 from experiments.measures import dimension_table, ranking_table
+from experiments.places import CONF
 from experiments.planner import quote_options
-from experiments.record import surroundings
-from experiments.run import DONE, FAILED, REFUSED, STOPPED
+from experiments.run import DONE, FAILED, REFUSED, STOPPED, VERSION_BASE
 from experiments.schema import plain
 from experiments.settings import RecordedSettings
 from experiments.store import canonical_json, digest, replace_file
+from experiments.surroundings import surroundings
 from experiments.tables import csv_bytes
 from experiments.task import plain_tree, results_folder
 from mlci.demonstrations import Demonstration
@@ -48,7 +49,7 @@ def main() -> int:
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises its errors, and they are worded here
     sys.argv[1:] = map(quote_options, sys.argv[1:])
     try:
-        hydra.main(config_path=str(CONF), config_name="infer", version_base="1.3")(_task)()
+        hydra.main(config_path=str(CONF), config_name="infer", **VERSION_BASE)(_task)()
     except KeyboardInterrupt:
         return STOPPED
     except Exception as error:
@@ -203,7 +204,7 @@ def _save(
         **made_from,
         "demonstrations": settings.demonstrations,
         "not_used": [str(problem) for problem in problems],
-        **surroundings(),
+        **surroundings(results_folder(settings)),
     }
     replace_file(folder / "record.json", json.dumps(record, indent=1).encode() + b"\n")
     return folder

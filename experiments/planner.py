@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import itertools
+import os
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.plugins import Plugins
-from hydra.core.utils import JobStatus
 from hydra.plugins.sweeper import Sweeper
 from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig
 from tqdm import tqdm
 
 from experiments.config import ConfigError, read_config
-from experiments.errors import CONF, describe_failures, explain, gather, job_names
+from experiments.errors import describe_failures, explain, gather, job_names
 from experiments.launcher import PoolLauncher
-from experiments.record import Point
-from experiments.settings import StudySettings
+from experiments.places import CONF
+from experiments.record import Point, State
+from experiments.settings import StudySettings, SweepSettings
+from experiments.study import write_plan
+from experiments.sweep import Planned, chosen, count_states, run_points
 from experiments.tables import collate
 from experiments.task import plain_tree, results_folder, run_task
 
@@ -33,10 +37,11 @@ class Planner(Sweeper):
 
     Attributes:
         params: values that an experiment sweeps, by key: "1,2,3".
+        ends: of each of these take the first and the last value only, and say so.
     """
 
-    def __init__(self, params: Mapping[str, str] | None = None) -> None:
-        self.params = dict(params or {})
+    def __init__(self, params: Mapping[str, str] | None = None, ends: bool = False) -> None:
+        self.params, self.ends = dict(params or {}), ends
 
     def setup(
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
@@ -54,27 +59,40 @@ class Planner(Sweeper):
             ConfigError: some point cannot be run; then none is.
             SweepFailed: some points failed, after all others ran; then no table is written.
         """
-        points, study = self._plan(self._jobs(arguments))
-        missing = [job for job, point in points.items() if not point.is_done()]
-        print(f"{len(points)} points: {len(points) - len(missing)} done, {len(missing)} to run")
-        returns = self._launcher.launch(missing, initial_job_idx=0) if missing else []
-        failed = {
-            name: done._return_value
-            for name, done in zip(job_names(missing), returns, strict=True)
-            if done.status is not JobStatus.COMPLETED
-        }
-        if failed:
-            raise SweepFailed(describe_failures(failed, len(points)))
-        for table in collate(list(points.values()), results_folder(study) / study.study):
+        plan, study = self._plan(self._jobs(arguments))
+        options, folder = study.sweep, results_folder(study) / study.study
+        todo = chosen(plan, options)
+        print(f"{len(plan)} points: {count_states(plan)}; {len(todo)} to run", flush=True)
+        if options.dry_run:
+            selected = set(todo)
+            for planned in plan:
+                mark = "run" if planned in selected else ""
+                print(f"{mark:4}{planned.state:8}{planned.point.identity[:8]}  {planned.name}")
+            return
+        write_plan(folder, [(planned.point, planned.job) for planned in plan])
+        outcome = run_points(
+            todo, lambda jobs: self._launcher.launch(jobs, initial_job_idx=0), options
+        )
+        if outcome.failures:
+            raise SweepFailed(describe_failures(outcome, len(plan)))
+        finished = {*todo, *(each for each in plan if each.state in (State.DONE, State.STALE))}
+        if len(finished) < len(plan):
+            left = len(plan) - len(finished)
+            print(f"{left} of {len(plan)} points are left, and no table is written")
+            return
+        points = [planned.point for planned in plan]
+        for table in collate(points, folder, mixed=options.mix_sources):
             print(f"written: {table}")
 
     def _jobs(self, arguments: list[str]) -> list[list[str]]:
         """The overrides of every point; the command line wins over the experiment's own."""
         parser = OverridesParser.create(config_loader=self._loader)
         values: dict[str, list[str]] = {}
+        shortened: dict[str, str] = {}
         own = [quote_options(f"{key}={swept}") for key, swept in self.params.items()]
         for override in parser.parse_overrides([*own, *arguments]):
             key, name = override.get_key_element(), override.key_or_group
+            shortened.pop(key, None)
             if not override.is_sweep_override():
                 values[key] = [f"{key}={override.get_value_element_as_str()}"]
             elif name in _NOT_SWEPT:
@@ -82,15 +100,20 @@ class Planner(Sweeper):
             elif not override.is_discrete_sweep():
                 raise ConfigError(f"{override.input_line}: cannot be swept; list its values")
             else:
-                each = override.sweep_string_iterator()
+                each = list(override.sweep_string_iterator())
+                if not each:
+                    raise ConfigError(f"{override.input_line}: there is no value to sweep")
+                if self.ends and override.input_line in own and len(each) > 2:
+                    shortened[key] = f"{each[0]} and {each[-1]} stand for all of {', '.join(each)}"
+                    each = [each[0], each[-1]]
                 values[key] = [quote_options(f"{key}={value}") for value in each]
+        for key, what in shortened.items():
+            print(f"{key}: {what}")
         return [list(job) for job in itertools.product(*values.values())]
 
-    def _plan(
-        self, jobs: Sequence[Sequence[str]]
-    ) -> tuple[dict[tuple[str, ...], Point], StudySettings]:
+    def _plan(self, jobs: Sequence[Sequence[str]]) -> tuple[list[Planned], StudySettings]:
         """Compose and check every point; of equal ones the first stays."""
-        points: dict[str, tuple[tuple[str, ...], Point]] = {}
+        plan: dict[str, Planned] = {}
         trees: dict[tuple[str, ...], dict[str, Any]] = {}
         problems: dict[str, list[str]] = {}
         bar = tqdm(jobs, desc="checking points", unit="point", leave=False, disable=None)
@@ -103,29 +126,33 @@ class Planner(Sweeper):
                     problems.setdefault(line, []).append(name)
                 continue
             point = Point(settings, results_folder(study))
-            points.setdefault(point.identity, (tuple(job), point))
-            trees[tuple(job)] = tree
+            if point.identity not in plan:
+                plan[point.identity] = Planned(tuple(job), name, point, point.state())
+                trees[tuple(job)] = tree
         if problems:
             raise ConfigError(gather(problems, len(jobs)))
-        if len(points) < len(jobs):
-            print(f"{len(jobs) - len(points)} of {len(jobs)} combinations repeat others")
+        if len(plan) < len(jobs):
+            print(f"{len(jobs) - len(plan)} of {len(jobs)} combinations repeat others")
         if isinstance(self._launcher, PoolLauncher):
-            self._launcher.composed = trees  # composing costs 0.2 s a point
-        return dict(points.values()), study
+            self._launcher.names = {planned.job: planned.name for planned in plan.values()}
+            self._launcher.composed = trees  # composing costs 0.1 s a point
+        return list(plan.values()), study
 
 
 def quote_options(argument: str) -> str:
     """grid=100,400 as grid='100','400': Hydra takes a bare number for a value, not an option."""
     key, _, values = argument.partition("=")
-    if not re.fullmatch(r"\d+(,\d+)*", values) or not (CONF / key).is_dir():
+    if not re.fullmatch(r"\d+(,\d+)*", values) or not (key and os.path.isdir(CONF / key)):
         return argument
     return key + "=" + ",".join(f"'{value}'" for value in values.split(","))
 
 
 _NOT_SWEPT = {
+    "scale": "a sweep has one scale; run it once for each",
     "experiment": "a sweep over experiments would drop the values that each of them sweeps; "
     "run them one after the other",
     **dict.fromkeys(
-        ("study", "results", "workers"), "this changes no result, so give it one value only"
+        ("study", "results", "workers", *(f"sweep.{f.name}" for f in fields(SweepSettings))),
+        "this changes no result, so give it one value only",
     ),
 }

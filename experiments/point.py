@@ -10,10 +10,10 @@ import pandas as pd
 from experiments.console import diagnosis_lines, measure_lines, ranking_lines, trial_line
 from experiments.measures import rank_tables, ranking_table, truth_tables
 from experiments.settings import Settings
-from experiments.stages import demonstrations
+from experiments.stages import demonstrations, tabular_model
 from experiments.store import Store
 from mlci.maxent import expected_violations, log_partition, sample_moves, violation_probabilities
-from mlci.mdp import action_grid, discretize, forbid
+from mlci.mdp import action_grid, forbid
 from mlci.metrics import (
     diagnose,
     final_state_error,
@@ -55,10 +55,8 @@ def run_point(
     system, grid, dt = settings.model, settings.cells, settings.dt
     actions = action_grid(system, list(settings.action_counts))
     hypotheses, steps = settings.candidates, step_count(settings.horizon, dt)
-    regions, count = hypotheses.joined(settings.constraint), len(hypotheses)
-    mdp = discretize(
-        system, grid, actions, dt, regions, settings.transition.samples, settings.temperature
-    )
+    count = len(hypotheses)
+    mdp = tabular_model(settings, store)
     starts = [int(cell) for cell in grid.index(trials.starts[kept])]
     goals = [grid.cells_in(trials.goal(trial)) for trial in kept]
     phi, reachable = expected_violations(mdp, starts, goals, [steps] * len(kept))
@@ -69,7 +67,7 @@ def run_point(
         log(line)
 
     # Under the truth: final-state error and violation distance.
-    constrained = forbid(mdp, np.arange(count, len(regions)))
+    constrained = forbid(mdp, np.arange(count, mdp.crosses.shape[1]))
     phi_truth = np.zeros_like(phi)
     error = np.full(len(kept), np.nan)
     for j, trial in enumerate(kept):

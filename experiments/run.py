@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import traceback
+from functools import cache
 
 import hydra
 from hydra.core.config_store import ConfigStore
@@ -14,13 +15,17 @@ from hydra.core.plugins import Plugins
 from omegaconf import DictConfig
 
 from experiments.config import ConfigError
-from experiments.errors import CONF, explain
+from experiments.errors import explain, of_config
 from experiments.launcher import PoolLauncher
+from experiments.places import CONF
 from experiments.planner import Planner, SweepFailed, quote_options
+from experiments.slurm import SlurmLauncher
 from experiments.tables import CollateError
-from experiments.task import run_task
+from experiments.task import run_once
 
 DONE, FAILED, REFUSED, STOPPED = 0, 1, 2, 130
+# Hydra 1.3 warns where this is left out, and 1.4 where it is given.
+VERSION_BASE = {"version_base": "1.3"} if hydra.__version__.startswith("1.3.") else {}
 
 
 def main() -> int:
@@ -36,7 +41,7 @@ def main() -> int:
     words = sorted(sys.argv[1:], key=lambda word: word not in ("-m", "--multirun"))
     sys.argv[1:] = [quote_options(word) for word in words]
     try:
-        hydra.main(config_path=str(CONF), config_name="config", version_base="1.3")(_run_once)()
+        hydra.main(config_path=str(CONF), config_name="config", **VERSION_BASE)(_run_once)()
     except KeyboardInterrupt:
         print("stopped; what has finished is kept: the same command runs the rest", file=sys.stderr)
         return STOPPED
@@ -44,18 +49,44 @@ def main() -> int:
         print(error, file=sys.stderr)
         return FAILED
     except Exception as error:
+        if isinstance(error, OSError) and not of_config(error):
+            # No room or no right to write: nothing that a config could mend.
+            print(f"{error}; what has finished is kept", file=sys.stderr)
+            return FAILED
         print(explain(error), file=sys.stderr)
         return REFUSED
     return DONE
 
 
+_SLURM = {
+    "jobs": 100,  # of the array; the points are dealt to them
+    "poll": 2.0,  # [s] between looks at the queue
+    "fail_fast": "${sweep.fail_fast}",
+    # What each job asks for; null leaves it to the cluster.
+    "partition": None,
+    "timeout_min": 60,
+    "cpus_per_task": 1,  # and as many points at once
+    "mem_gb": None,
+    "array_parallelism": 256,  # jobs that run at the same time
+    "setup": None,  # shell commands before, as a list
+    "additional_parameters": None,  # more of sbatch's options: {account: mine}
+}
+
+
+@cache  # Hydra 1.4 wants them once
 def register_plugins() -> None:
     """Make the sweeper and the launcher known to Hydra, however the project is installed."""
     # Hydra 1.3 accepts plugins of the package `hydra_plugins` only; 1.4 has no such rule.
     Plugins.is_in_toplevel_plugins_module = staticmethod(lambda target: True)  # type: ignore[assignment, method-assign]
     for group, name, plugin, settings in (
-        ("hydra/sweeper", "planner", Planner, {"params": None}),
-        ("hydra/launcher", "pool", PoolLauncher, {"workers": "${workers}"}),
+        ("hydra/sweeper", "planner", Planner, {"params": None, "ends": False}),
+        (
+            "hydra/launcher",
+            "pool",
+            PoolLauncher,
+            {"workers": "${workers}", "fail_fast": "${sweep.fail_fast}"},
+        ),
+        ("hydra/launcher", "slurm", SlurmLauncher, _SLURM),
     ):
         Plugins.instance().register(plugin)
         target = f"{plugin.__module__}.{plugin.__name__}"
@@ -68,7 +99,7 @@ def _run_once(config: DictConfig) -> None:
     try:
         if HydraConfig.get().sweeper.get("params"):
             raise ConfigError("experiment: this one describes a sweep; add -m to run it")
-        run_task(config)
+        run_once(config)
     except ConfigError as error:
         print(error, file=sys.stderr)
         raise SystemExit(REFUSED) from None

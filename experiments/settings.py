@@ -203,12 +203,38 @@ class RecordedSettings(ModelSettings):
 
 
 @dataclass(frozen=True)
+class SweepSettings:
+    """Which points of a sweep run, and what is done about those that fail.
+
+    Attributes:
+        only: run points in these states alone; None for all that are not done.
+        force: run points even if they are done.
+        limit: run at most so many points.
+        time_limit: [s] that a point may take.
+        retries: how often a point that failed is tried again.
+        fail_fast: start no point after one has failed.
+        dry_run: show the points with their states, and run none.
+        mix_sources: tables may join points of different versions of the source.
+    """
+
+    only: tuple[str, ...] | None
+    force: bool
+    limit: int | None
+    time_limit: float | None
+    retries: int
+    fail_fast: bool
+    dry_run: bool
+    mix_sources: bool
+
+
+@dataclass(frozen=True)
 class StudySettings:
     """Where and how points run: it changes no result, so it is no part of a point's identity."""
 
     study: str
     results: str | None
     workers: int | None
+    sweep: SweepSettings
 
 
 def system_class(target: str) -> type[System]:
@@ -220,7 +246,7 @@ def system_class(target: str) -> type[System]:
     module_name, _, name = target.rpartition(".")
     try:
         found = getattr(importlib.import_module(module_name), name, None)
-    except (ImportError, ValueError):
+    except (ImportError, TypeError, ValueError):  # TypeError: it starts with a dot
         raise ValueError(f"{target!r} cannot be imported") from None
     if not (inspect.isclass(found) and issubclass(found, System)) or inspect.isabstract(found):
         raise ValueError(f"{target!r} is not a subclass of mlci.systems.System")

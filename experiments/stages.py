@@ -1,27 +1,36 @@
-"""The stages that points share: the safe set of a truth, and the demonstrations under it.
+"""The stages that points share, kept in the store by the content of what they depend on.
 
-Each is computed once for all grids, time steps and action counts, and kept in the store by the
-content of what it depends on.
+The safe set of a truth and the demonstrations under it are computed once for all grids, time steps
+and action counts; the tabular model once for all truths, seeds and tasks.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
+from scipy import sparse
 
 import mlci.demonstrator
+import mlci.mdp
 import mlci.reachability
 import mlci.safety_filter
 from experiments.settings import Settings
-from experiments.store import Store
+from experiments.store import Store, Stored
+from mlci.constraints import ConstraintSet
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
+from mlci.mdp import TabularMDP, action_grid, discretize
 from mlci.reachability import SafeSet, solve
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.spaces import Box, Floats, Ints
+
+# What is stored of a tabular MDP: its own arrays, and those of the sparse matrix of crossings.
+_MOVES = ("successor", "reward", "allowed", "action")
+_CROSSINGS = ("indices", "indptr")
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +137,53 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
     )
     modules = [mlci.demonstrator, mlci.safety_filter, sys.modules[__name__]]
     return TrialSet(**store.get("demonstrations", depends, modules, compute))
+
+
+def tabular_model(settings: Settings, store: Store) -> TabularMDP:
+    """The tabular MDP (1), whose moves know the hypotheses that they cross, and then the truth."""
+    hypotheses, truth = settings.candidates, settings.constraint
+    stored = _discretized(settings, store, "mdp", hypotheses, (*_MOVES, *_CROSSINGS))
+    # Apart, so that points which differ in the truth share what takes the time.
+    apart = _discretized(settings, store, "mdp_truth", truth, _CROSSINGS)
+    crosses = [
+        sparse.csr_matrix(
+            (np.ones(len(each["indices"]), dtype=bool), each["indices"], each["indptr"]),
+            shape=(stored["successor"].size, len(regions)),
+        )
+        for each, regions in ((stored, hypotheses), (apart, truth))
+    ]
+    moves = {name: stored[name] for name in _MOVES}
+    return TabularMDP(**moves, crosses=sparse.hstack(crosses, format="csr"))
+
+
+def _discretized(
+    settings: Settings, store: Store, stage: str, regions: ConstraintSet, wanted: Sequence[str]
+) -> Stored:
+    """Arrays of the tabular MDP with the crossings of some regions, from the store or computed."""
+    counts, samples = settings.action_counts, settings.transition.samples
+
+    def compute() -> dict[str, np.ndarray]:
+        system = settings.model
+        actions = action_grid(system, counts)
+        mdp = discretize(
+            system, settings.cells, actions, settings.dt, regions, samples, settings.temperature
+        )
+        arrays = {name: getattr(mdp, name) for name in _MOVES}
+        arrays |= {name: getattr(mdp.crosses, name) for name in _CROSSINGS}
+        return {name: arrays[name] for name in wanted}
+
+    depends = (
+        settings.system,
+        settings.grid,
+        counts,
+        settings.dt,
+        samples,
+        settings.temperature,
+        # Infinite sides are no JSON.
+        [[repr(float(side)) for side in box] for box in np.hstack([regions.lower, regions.upper])],
+    )
+    modules = [mlci.mdp, _system_module(settings), sys.modules[__name__]]
+    return store.get(stage, depends, modules, compute)
 
 
 def _task_box(settings: Settings) -> Box:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import importlib
 import importlib.util
 import io
 import json
@@ -20,9 +19,10 @@ import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from filelock import FileLock
@@ -33,6 +33,8 @@ from experiments.schema import plain
 _log = logging.getLogger(__name__)
 
 Arrays = Mapping[str, NDArray[Any]]
+
+PART = ".part"  # the end of the names of files that are being written
 
 
 class Stored(dict[str, NDArray[Any]]):
@@ -72,7 +74,7 @@ class Store:
             modules: the modules that do the work; those of this project that they import count too.
             compute: makes the arrays, none of them of Python objects.
         """
-        source = source_hash(modules)
+        source = source_hash([module.__name__ for module in modules])
         made_from = {"stage": stage, "depends": plain(depends), "source": source}
         key = digest(canonical_json(made_from))[:32]
         self.keys[stage] = key
@@ -116,11 +118,18 @@ def digest(data: bytes) -> str:
 
 def replace_file(path: Path, data: bytes) -> None:
     """Write a file so that, whatever happens, it is the old one or the new one."""
+    with replacing(path) as file:
+        file.write(data)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file to write, which takes the place of the old one once all of it is on disk."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=".part")
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=PART)
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            yield file
             file.flush()
             os.fsync(file.fileno())
         os.chmod(name, 0o644)
@@ -130,10 +139,13 @@ def replace_file(path: Path, data: bytes) -> None:
         raise
 
 
-def source_hash(modules: Iterable[ModuleType]) -> str:
-    """Hash of the source of modules and of all that they import from their own packages."""
+def source_hash(modules: Iterable[str]) -> str:
+    """Hash of the source of named modules and of all that they import from their own packages.
+
+    Sources are read, never run: a name may come from a file of results.
+    """
     sources: dict[str, str] = {}
-    waiting = [module.__name__ for module in modules]
+    waiting = list(modules)
     packages = {name.partition(".")[0] for name in waiting} | {"mlci"}
     while waiting:
         name = waiting.pop()
@@ -146,17 +158,17 @@ def source_hash(modules: Iterable[ModuleType]) -> str:
 @cache
 def _read_source(name: str) -> tuple[str, tuple[str, ...]]:
     """Digest of a module's source, and the modules that it imports."""
-    module = importlib.import_module(name)
-    if module.__file__ is None:
+    spec = _find(name)
+    if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
         return "", ()
-    data = Path(module.__file__).read_bytes()
+    data = Path(spec.origin).read_bytes()
     found: list[str] = []
     for node in ast.walk(ast.parse(data)):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             start = "." * node.level + (node.module or "")
-            origin = importlib.util.resolve_name(start, module.__package__)
+            origin = importlib.util.resolve_name(start, spec.parent)
             found.append(origin)
             # `from package import module` names a module only if it is one.
             inner = [f"{origin}.{alias.name}" for alias in node.names]
@@ -164,13 +176,24 @@ def _read_source(name: str) -> tuple[str, tuple[str, ...]]:
     return digest(data), tuple(found)
 
 
+def _find(name: str) -> ModuleSpec | None:
+    """Where a module is, found without running the packages that it is in."""
+    top, *inner = name.split(".")
+    try:
+        spec = importlib.util.find_spec(top)
+    except (ImportError, ValueError):
+        return None
+    for part in inner:
+        if spec is None or spec.submodule_search_locations is None:
+            return None
+        spec = PathFinder.find_spec(f"{spec.name}.{part}", spec.submodule_search_locations)
+    return spec
+
+
 @cache
 def _module_names(package: str) -> frozenset[str]:
     """Full names of the modules inside a package; none if it is a plain module."""
-    try:
-        spec = importlib.util.find_spec(package)
-    except (ImportError, ValueError):
-        return frozenset()
+    spec = _find(package)
     folders = spec.submodule_search_locations if spec else None
     paths = [path for folder in folders or () for path in Path(folder).iterdir()]
     return frozenset(f"{package}.{path.stem}" for path in paths if path.suffix in ("", ".py"))

@@ -6,18 +6,21 @@ Collating copies rows as text, so a study's table holds exactly the numbers that
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import pandas as pd
 
 from experiments.measures import TRUTH_TABLES
 from experiments.schema import plain
 from experiments.settings import Settings
-from experiments.store import digest, replace_file
+from experiments.store import digest, replacing
+from experiments.study import Collated, write_collated
 
 if TYPE_CHECKING:
     from experiments.record import Point
@@ -49,15 +52,16 @@ def csv_bytes(frame: pd.DataFrame) -> bytes:
     return text.encode()
 
 
-def collate(points: Sequence[Point], study: Path) -> list[Path]:
-    """Write one table a measure for all points of a study, and the list of those points.
+def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> list[Path]:
+    """Write one table a measure for all points of a study, and list what they came from.
 
     Rows are ordered by the points' settings, then as each point wrote them. A setting that
     differs between points, and that the usual columns do not tell apart, becomes a column.
 
     Args:
-        points: the points, in any order; each finished, with one version of the source.
-        study: the study's folder.
+        points: the points, in any order; each finished.
+        folder: the study's folder.
+        mixed: whether points may come from different versions of the source.
 
     Returns:
         the tables' paths.
@@ -65,19 +69,13 @@ def collate(points: Sequence[Point], study: Path) -> list[Path]:
     Raises:
         CollateError: a point that is not finished, or whose source or columns differ.
     """
-    records = {}
-    for point in points:
-        record = point.record()
-        if record is None:
-            raise CollateError(f"point {point.identity} is not finished: {point.folder}")
-        records[point.identity] = record
-    sources = {record["source"] for record in records.values()}
-    if len(sources) > 1:
-        raise CollateError(
-            "these points come from different versions of the source; run the sweep again: "
-            + ", ".join(f"{name} ({record['source'][:8]})" for name, record in records.items())
-        )
-    flat = {point.identity: _flatten(plain(point.settings)) for point in points}
+    records = {point.identity: _read_record(point) for point in points}
+    by_source: dict[str, list[str]] = {}
+    for identity, record in records.items():
+        by_source.setdefault(record["source"], []).append(identity)
+    if len(by_source) > 1 and not mixed:
+        raise CollateError(_describe_mixture(by_source))
+    flat = {point.identity: flatten(plain(point.settings)) for point in points}
     ordered = sorted(
         points,
         key=lambda point: (
@@ -87,58 +85,101 @@ def collate(points: Sequence[Point], study: Path) -> list[Path]:
         ),
     )
     names = sorted({name for record in records.values() for name in record["files"]} - {"log.txt"})
-    written, digests = [], {}
-    for name in names:
-        measure = Path(name).stem
-        same: dict[str, list[Point]] = {}
-        for point in ordered:
-            content = records[point.identity]["files"].get(name, "")
-            alike = content if measure in TRUTH_TABLES else point.identity
-            same.setdefault(alike, []).append(point)
-        groups = list(same.values())
-        extra = _extra_columns(groups, measure, flat)
-        data = _join([group[0] for group in groups], name, extra, flat)
-        replace_file(study / "tables" / name, data)
-        written.append(study / "tables" / name)
-        digests[name] = digest(data)
-    listing = {
-        "source": sources.pop(),
-        "points": [point.identity for point in ordered],
-        "tables": digests,
-    }
-    replace_file(study / "study.json", json.dumps(listing, indent=1).encode() + b"\n")
-    return written
+    alone = [[point] for point in ordered]
+    alone_extra = _extra_columns(alone, "", flat)
+    digests = {}
+    with ExitStack() as written:  # no table takes its place unless all are whole
+        for name in names:
+            groups, extra = alone, alone_extra
+            if Path(name).stem in TRUTH_TABLES:
+                same: dict[str, list[Point]] = {}
+                for point in ordered:
+                    content = records[point.identity]["files"].get(name, "")
+                    same.setdefault(content, []).append(point)
+                groups = list(same.values())
+                extra = _extra_columns(groups, Path(name).stem, flat)
+            file = written.enter_context(replacing(folder / "tables" / name))
+            first = [(group[0], records[group[0].identity]["files"].get(name)) for group in groups]
+            digests[name] = _join(file, name, first, extra, flat)
+    git = [record["git"] for record in records.values()]
+    started = [record["started"] for record in records.values()]
+    collated = Collated(
+        points=tuple(point.identity for point in ordered),
+        sources={source: len(by_source[source]) for source in sorted(by_source)},
+        commits=tuple(sorted({state["commit"] for state in git if state["commit"]})),
+        dirty=any(state["dirty"] for state in git),
+        started=(min(started), max(started)),
+        tables=digests,
+    )
+    write_collated(folder, collated)
+    return [folder / "tables" / name for name in names]
+
+
+def _read_record(point: Point) -> dict[str, Any]:
+    """A point's record; its files are checked when they are read."""
+    try:
+        record: dict[str, Any] = json.loads((point.folder / "record.json").read_bytes())
+        if record["identity"] == point.identity:
+            return record
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    raise CollateError(f"point {point.identity} is not finished: {point.folder}")
+
+
+def _describe_mixture(by_source: Mapping[str, Sequence[str]]) -> str:
+    """Which points come from which version of the source, most first."""
+    lines = [
+        f"  {source[:12]}: {len(points)} points, such as {points[0]}"
+        for source, points in sorted(by_source.items(), key=lambda item: -len(item[1]))
+    ]
+    return "\n".join(
+        [
+            "these points come from different versions of the source, and no table is written; "
+            "run the sweep again, or tell it to mix them with sweep.mix_sources=true:",
+            *lines,
+        ]
+    )
 
 
 def _join(
-    ordered: Sequence[Point], name: str, extra: Sequence[str], flat: Mapping[str, dict[str, Any]]
-) -> bytes:
-    """One table of all points, with the extra columns in front."""
-    text = io.StringIO()
-    header = None
-    for point in ordered:
+    file: BinaryIO,
+    name: str,
+    points: Sequence[tuple[Point, str | None]],
+    extra: Sequence[str],
+    flat: Mapping[str, dict[str, Any]],
+) -> str:
+    """Write one table of all points, with the extra columns in front; returns its digest.
+
+    Each point comes with the digest that its own table must have.
+    """
+    header, seen = None, hashlib.sha256()
+    for point, expected in points:
         path = point.folder / name
-        try:
-            first, rows = path.read_text().split("\n", 1)
-        except FileNotFoundError:
-            raise CollateError(f"point {point.identity} has no table {name}: {path}") from None
-        if header is None:
-            header = first
-            text.write(_csv_row(extra) + header + "\n")
-        elif first != header:
-            raise CollateError(f"the columns of {path} are {first}, not {header}")
+        if not expected or not path.exists():
+            raise CollateError(f"point {point.identity} has no table {name}: {path}")
+        data = path.read_bytes()
+        if digest(data) != expected:
+            raise CollateError(f"{path} is not as its point wrote it; run the sweep again")
+        first, _, rows = data.partition(b"\n")
         values = _csv_row([flat[point.identity].get(key, "") for key in extra])
-        text.writelines(f"{values}{row}\n" for row in rows.splitlines())
-    return text.getvalue().encode()
+        if values and rows:
+            rows = values + rows[:-1].replace(b"\n", b"\n" + values) + b"\n"
+        if header is None:
+            header, rows = first, _csv_row(extra) + first + b"\n" + rows
+        elif first != header:
+            raise CollateError(f"the columns of {path} are {first.decode()}, not {header.decode()}")
+        file.write(rows)
+        seen.update(rows)
+    return seen.hexdigest()
 
 
-def _csv_row(values: Sequence[Any]) -> str:
+def _csv_row(values: Sequence[Any]) -> bytes:
     """Values as the start of a CSV line, up to and with the comma before the next."""
     if not values:
-        return ""
+        return b""
     text = io.StringIO()
     csv.writer(text, lineterminator=",").writerow(values)
-    return text.getvalue()
+    return text.getvalue().encode()
 
 
 def _extra_columns(
@@ -168,13 +209,13 @@ def _extra_columns(
     return extra
 
 
-def _flatten(tree: Any, prefix: str = "") -> dict[str, Any]:
+def flatten(tree: Any, prefix: str = "") -> dict[str, Any]:
     """Scalars by dotted key, in order; a list is one value, spelt as JSON."""
     if not isinstance(tree, dict):
         return {prefix: json.dumps(tree) if isinstance(tree, list) else tree}
     flat = {}
     for key, value in tree.items():
-        flat.update(_flatten(value, f"{prefix}.{key}" if prefix else key))
+        flat.update(flatten(value, f"{prefix}.{key}" if prefix else key))
     return flat
 
 

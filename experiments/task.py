@@ -8,29 +8,42 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from experiments import attempt
 from experiments.config import ConfigError, read_config
-from experiments.record import CHECKOUT, Point
+from experiments.places import default_results
+from experiments.record import Point, State
 from experiments.settings import RecordedSettings, StudySettings
 
 
-def run_task(config: DictConfig) -> str:
+def run_once(config: DictConfig) -> None:
     """Run the point of a composed config, unless it is finished; prints its log either way.
-
-    Returns:
-        the point's identity.
 
     Raises:
         ConfigError: the config cannot be run.
     """
     settings, study = read_config(plain_tree(config))
     point = Point(settings, results_folder(study))
-    if point.is_done():
+    if study.sweep.dry_run:
+        print(f"{point.state()}: {point.folder}")
+    elif point.is_done() and not study.sweep.force:
         print((point.folder / "log.txt").read_text(), end="")
         print(f"finished before: {point.folder}")
     else:
-        point.run(print)
+        if point.is_running():
+            print(f"another process runs this point, and is waited for: {point.folder}")
+        attempt.run(point, print, force=study.sweep.force)
         print(f"written: {point.folder}")
-    return point.identity
+
+
+def run_task(config: DictConfig) -> State:
+    """Run one point of a sweep, in a process of any launcher's.
+
+    Returns:
+        State.DONE, or State.RUNNING if somebody else runs it.
+    """
+    settings, study = read_config(plain_tree(config))
+    point = Point(settings, results_folder(study))
+    return attempt.run_apart(point, force=study.sweep.force, time_limit=study.sweep.time_limit)
 
 
 def plain_tree(config: DictConfig) -> dict[str, Any]:
@@ -49,6 +62,6 @@ def plain_tree(config: DictConfig) -> dict[str, Any]:
 
 
 def results_folder(settings: StudySettings | RecordedSettings) -> Path:
-    """Where results go: the checkout's own folder unless another is given."""
+    """Where results go: the usual folder unless another is given."""
     given = settings.results
-    return CHECKOUT / "results" if given is None else Path(given).resolve()
+    return default_results() if given is None else Path(given).resolve()

@@ -10,7 +10,7 @@ from hydra import compose, initialize_config_dir
 
 from experiments import run
 from experiments.config import ConfigError, read_config
-from experiments.errors import CONF
+from experiments.places import CONF
 from experiments.planner import quote_options
 from experiments.record import Point
 from experiments.schema import Problems, parse
@@ -20,7 +20,7 @@ run.register_plugins()
 
 
 def composed(*overrides: str) -> dict:
-    with initialize_config_dir(str(CONF), version_base="1.3"):
+    with initialize_config_dir(str(CONF), **run.VERSION_BASE):
         return plain_tree(compose("config", [quote_options(word) for word in overrides]))
 
 
@@ -256,10 +256,10 @@ def test_all_wrong_points_of_a_sweep_are_reported_at_once(
     ("arguments", "message"),
     [
         (["-m", "grid=100,300"], "grid: there is no 300; there are 100, 400, 900, 1600 [1 of 2"),
-        (["-m", "experiment=paper,smoke"], "experiment=paper,smoke: a sweep over experiments"),
+        (["-m", "experiment=paper,other"], "experiment=paper,other: a sweep over experiments"),
         (["-m", "study=a,b"], "study=a,b: this changes no result"),
         (["-m", "dt=interval(0,1)"], "dt=interval(0,1): cannot be swept; list its values"),
-        (["experiment=smoke", "hydra.mode=RUN"], "experiment: this one describes a sweep; add -m"),
+        (["experiment=paper", "hydra.mode=RUN"], "experiment: this one describes a sweep; add -m"),
     ],
 )
 def test_sweep_that_cannot_be_is_refused(

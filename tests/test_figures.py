@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +13,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.colors import to_hex
 
 from paper_figures import hypothesis_map, rank_curve
-from paper_figures.__main__ import main
+from paper_figures.__main__ import draw_study
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, TRUTH, save
 
 
@@ -144,9 +146,20 @@ def test_a_study_is_drawn_from_its_tables_alone(tmp_path: Path) -> None:
     (tmp_path / "tables").mkdir()
     for name, table in tables.items():
         table.to_csv(tmp_path / "tables" / f"{name}.csv", index=False)
-    drawn = main(tmp_path)
+    drawn = draw_study(tmp_path)
     assert [path.name for path in drawn] == ["hypotheses_c1.png", "rank_of_the_truth.png"]
     assert all(path.exists() and path.with_suffix(".pdf").exists() for path in drawn)
+    note = json.loads((tmp_path / "figures" / "figures.json").read_text())
+    digests = {
+        f"{name}.csv": hashlib.sha256(
+            (tmp_path / "tables" / f"{name}.csv").read_bytes()
+        ).hexdigest()
+        for name in tables
+    }
+    assert note["figures"]["rank_of_the_truth"] == {
+        "rank_quantiles.csv": digests.pop("rank_quantiles.csv")
+    }
+    assert note["figures"]["hypotheses_c1"] == digests
     (tmp_path / "tables" / "paths.csv").unlink()
     with pytest.raises(SystemExit, match="no table paths: run the study first"):
-        main(tmp_path)
+        draw_study(tmp_path)

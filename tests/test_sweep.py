@@ -1,7 +1,9 @@
 """Sweeps as a user runs them: parallel, resumed, failing and stopped."""
 
 import contextlib
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.record import CHECKOUT
+from experiments.places import CHECKOUT
 
 RUN = [sys.executable, str(CHECKOUT / "experiments" / "run.py")]
 TINY = [
@@ -35,8 +37,9 @@ TINY = [
 ]
 # A system that goes wrong in the worker only, once the config was accepted.
 FAULTY = """
-import os, sys, time
+import os, resource, sys, time, warnings
 from dataclasses import dataclass
+from pathlib import Path
 from mlci.systems import DoubleIntegrator
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +47,23 @@ class Faulty(DoubleIntegrator):
     fault: str = "none"
 
     def dynamics(self, states, controls):
-        if self.fault == "raise":
+        fault = "none" if Path("healed").exists() else self.fault
+        if fault == "raise":
             raise ArithmeticError("the mass fell off its line")
-        if self.fault == "exit":
+        if fault == "exit":
             os._exit(3)
-        if self.fault == "hang":
+        if fault == "crash":
+            os.abort()
+        if fault == "hang":
             time.sleep(600)
+        if fault == "slow":
+            time.sleep(0.005)
+        if fault == "warn":
+            os.system("echo from another program")
+            warnings.warn("the mass wobbles")
+        # No file may grow beyond this: a full disk, for one point.
+        most = 5_000 if fault == "full" else resource.RLIM_INFINITY
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
         return super().dynamics(states, controls)
 """
 
@@ -58,7 +72,7 @@ def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [*RUN, *TINY, f"results={folder / 'results'}", *arguments],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(folder)},
+        env={**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{CHECKOUT}"},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -112,17 +126,17 @@ def test_tables_do_not_depend_on_workers_order_or_repetition(tmp_path: Path) -> 
     two.mkdir()
     status, out, err = run(one, "-m", "dt=0.5,1.0", "actions=2,3", "study=s", "workers=2")
     assert status == 0, err
-    assert "4 points: 0 done, 4 to run" in out
+    assert "4 points: 4 missing; 4 to run" in out
     status, out, err = run(two, "-m", "actions=3,2,3", "dt=1,0.5", "study=s", "workers=1")
     assert status == 0, err
     assert "2 of 6 combinations repeat others" in out
-    assert "4 points: 0 done, 4 to run" in out
+    assert "4 points: 4 missing; 4 to run" in out
     assert tables(one, "s") == tables(two, "s")
     # Nothing but results was written, and nothing is run twice.
     assert [path.name for path in two.iterdir()] == ["results"]
     status, out, _ = run(two, "-m", "dt=0.5,1.0", "actions=2,3", "study=again")
     assert status == 0
-    assert "4 points: 4 done, 0 to run" in out
+    assert "4 points: 4 done; 0 to run" in out
     assert tables(one, "s") == tables(two, "again")
 
 
@@ -136,17 +150,123 @@ def test_single_run_shows_its_log_again_when_it_was_finished(tmp_path: Path) -> 
     assert "finished before: " in second
 
 
-def test_failed_points_leave_the_others_and_no_table(tmp_path: Path) -> None:
-    wrong = faulty(tmp_path)
-    status, out, err = run(tmp_path, "-m", *wrong, "+system.fault=raise,none,exit", "study=s")
+def failure_table(err: str) -> list[list[str]]:
+    """Reason, point and message of each row at the end."""
+    rows = err[err.index("points failed, and no table is written") :].splitlines()[1:]
+    return [row.split(maxsplit=2) for row in rows]
+
+
+def records(folder: Path) -> list[dict]:
+    paths = (folder / "results" / "points").glob("*/record.json")
+    return [json.loads(path.read_bytes()) for path in paths]
+
+
+def test_failed_points_fail_alone_and_are_run_again_when_asked(tmp_path: Path) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=raise,none,exit,crash,hang,full,warn"]
+    sweep += ["study=s", "sweep.time_limit=2"]
+    status, out, err = run(tmp_path, *sweep)
     assert status == 1
-    assert "3 points: 0 done, 3 to run" in out
-    assert "2 of 3 points failed" in err
-    assert "ArithmeticError: the mass fell off its line" in err
-    assert "in dynamics" in err
-    assert "+system.fault=exit: ProcessExpired" in err
-    assert len(list((tmp_path / "results" / "points").glob("*/record.json"))) == 1
-    assert not (tmp_path / "results" / "s").exists()
+    assert "7 points: 7 missing; 7 to run" in out
+    assert "5 of 7 points failed" in err
+    table = failure_table(err)
+    name = "+system.fault="
+    assert [row[:2] for row in table] == [
+        ["raised", f"{name}raise"],
+        ["died", f"{name}exit"],
+        ["died", f"{name}crash"],
+        ["timeout", f"{name}hang"],
+        ["raised", f"{name}full"],
+    ]
+    assert table[0][2] == "ArithmeticError: the mass fell off its line"
+    assert table[1][2] == "ChildProcessError: the worker process ended with 3"
+    assert table[2][2] == "ChildProcessError: the worker process was killed by SIGABRT"
+    assert table[3][2] == "still running at its time limit"
+    assert table[4][2] == "OSError: [Errno 27] File too large"
+    # Where each of them was, whether it could still say so itself or not.
+    for where in [
+        'raise ArithmeticError("the mass',
+        "Fatal Python error: Abort",
+        "Timeout (0:00:02)",
+    ]:
+        assert where in err
+    assert len(re.findall(r"in dynamics", err)) == 3
+    assert not list((tmp_path / "results").rglob("*.part"))
+    assert not list((tmp_path / "results" / "s").rglob("*.csv"))
+    logs = [path.read_text() for path in (tmp_path / "results" / "points").glob("*/log.txt")]
+    assert sum("from another program" in log and "the mass wobbles" in log for log in logs) == 1
+    assert "wobbles" not in out + err
+
+    status, out, err = run(tmp_path, *sweep, "sweep.only=[missing,stale]")
+    assert status == 0
+    assert "7 points: 2 done, 5 failed; 0 to run" in out
+    assert "5 of 7 points are left, and no table is written" in out
+    (tmp_path / "healed").touch()
+    status, out, err = run(tmp_path, *sweep, "sweep.only=[failed]", "sweep.limit=1")
+    assert status == 0
+    assert "7 points: 2 done, 5 failed; 1 to run" in out
+    status, out, err = run(tmp_path, *sweep)
+    assert status == 0, err
+    assert "7 points: 3 done, 4 failed; 4 to run" in out
+    assert sorted(record["attempt"] for record in records(tmp_path)) == [1, 1, 2, 2, 2, 2, 2]
+    assert not list((tmp_path / "results").rglob("failure.json"))
+
+
+def test_first_failure_stops_a_sweep_that_fails_fast(tmp_path: Path) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=raise,none", "seed=0,1,2", "workers=1"]
+    status, out, err = run(tmp_path, *sweep, "sweep.fail_fast=true")
+    assert status == 1
+    assert "1 of 6 points failed" in err
+    assert err.splitlines()[-1] == "5 points were not started"
+    status, out, err = run(tmp_path, *sweep, "sweep.retries=1", "sweep.limit=1")
+    assert status == 1
+    assert "6 points: 1 failed, 5 missing; 1 to run" in out
+    failure = next((tmp_path / "results" / "points").glob("*/failure.json"))
+    assert json.loads(failure.read_bytes())["attempt"] == 3
+
+
+def test_dry_run_shows_states_and_writes_nothing(tmp_path: Path) -> None:
+    status, out, err = run(tmp_path, "-m", "dt=0.5,1.0", "sweep.dry_run=true", "sweep.limit=1")
+    assert status == 0, err
+    header, first, second = out.splitlines()
+    assert header == "2 points: 2 missing; 1 to run"
+    assert re.fullmatch(r"run missing +[0-9a-f]{8}  dt=0.5", first)
+    assert re.fullmatch(r"    missing +[0-9a-f]{8}  dt=1.0", second)
+    assert not list(tmp_path.iterdir())
+
+
+def test_forced_point_runs_again(tmp_path: Path) -> None:
+    assert run(tmp_path, "-m", "study=s")[0] == 0
+    before = tables(tmp_path, "s")
+    status, out, _ = run(tmp_path, "-m", "study=s", "sweep.force=true")
+    assert status == 0
+    assert "1 points: 1 done; 1 to run" in out
+    assert [record["attempt"] for record in records(tmp_path)] == [2]
+    assert tables(tmp_path, "s") == before
+
+
+def test_two_sweeps_at_once_share_the_points(tmp_path: Path) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=slow", "seed=0,1,2,3,4,5"]
+    both = [start(tmp_path, *sweep, f"study={name}", "workers=2") for name in ("a", "b")]
+    outputs = [process.communicate(timeout=120) for process in both]
+    assert [process.returncode for process in both] == [0, 0], outputs
+    assert [record["attempt"] for record in records(tmp_path)] == [1] * 6
+    assert tables(tmp_path, "a") == tables(tmp_path, "b")
+
+
+def test_resumes_after_its_processes_were_killed(tmp_path: Path) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=none,hang", "workers=2", "study=s"]
+    process = start(tmp_path, *sweep)
+    while not (records(tmp_path) and list(tmp_path.rglob("attempt.json"))):
+        time.sleep(0.1)
+        assert process.poll() is None
+    process.kill()
+    process.communicate(timeout=20)
+    assert gone(process.pid, patience=10)  # one may be starting, and looks when it has started
+    (tmp_path / "healed").touch()
+    status, out, err = run(tmp_path, *sweep)
+    assert status == 0, err
+    assert "2 points: 1 done, 1 missing; 1 to run" in out
+    assert sorted(record["attempt"] for record in records(tmp_path)) == [1, 2]
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
@@ -170,4 +290,4 @@ def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(
     assert gone(process.pid)
     status, out, _ = run(tmp_path, "-m", *wrong, "+system.fault=none")
     assert status == 0
-    assert "1 points: 1 done, 0 to run" in out
+    assert "1 points: 1 done; 0 to run" in out

@@ -9,13 +9,14 @@ import pandas as pd
 import pytest
 from hydra import compose, initialize_config_dir
 
+from experiments import attempt, run
 from experiments import point as point_module
-from experiments import run
 from experiments.config import read_config
-from experiments.errors import CONF
+from experiments.places import CONF
 from experiments.record import Point
 from experiments.settings import Settings
-from experiments.store import Store
+from experiments.store import Store, digest
+from experiments.study import StudyError, read_study, write_plan
 from experiments.tables import CollateError, collate
 from experiments.task import plain_tree
 
@@ -26,7 +27,7 @@ NUMBERS = np.array([1 / 3, 1e-300, np.nan, -0.1, 2**53 + 1.0])
 
 @pytest.fixture(scope="module")
 def settings() -> Settings:
-    with initialize_config_dir(str(CONF), version_base="1.3"):
+    with initialize_config_dir(str(CONF), **run.VERSION_BASE):
         return read_config(plain_tree(compose("config")))[0]
 
 
@@ -48,7 +49,7 @@ def tiny_point(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def finished(settings: Settings, results: Path, **changes: object) -> Point:
     point = Point(dataclasses.replace(settings, **changes), results)
-    point.run(print)
+    attempt.run(point, print)
     return point
 
 
@@ -156,3 +157,72 @@ def test_collate_refuses_other_columns(
     two = finished(settings, tmp_path, seed=1)
     with pytest.raises(CollateError, match=r"the columns of .*trials.csv are"):
         collate([one, two], tmp_path / "study")
+
+
+def test_collate_mixes_sources_when_told_and_lists_them(
+    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points = [finished(settings, tmp_path, seed=seed) for seed in (0, 1)]
+    monkeypatch.setattr("experiments.record.source_hash", lambda modules: "edited")
+    points.append(finished(settings, tmp_path, seed=2))
+    with pytest.raises(CollateError, match=rf"edited: 1 points, such as {points[2].identity}"):
+        collate(points, tmp_path / "study")
+    collate(points, tmp_path / "study", mixed=True)
+    study = read_study(tmp_path / "study")
+    assert study is not None
+    assert study.collated is not None
+    assert sorted(study.collated.sources.values()) == [1, 2]
+    assert study.collated.sources["edited"] == 1
+
+
+def test_refused_collate_leaves_all_old_tables(settings: Settings, tmp_path: Path) -> None:
+    points = [finished(settings, tmp_path, seed=seed) for seed in (0, 1)]
+    collate(points[:1], tmp_path / "study")
+    before = {path: path.read_bytes() for path in (tmp_path / "study").rglob("*.*")}
+    trials = points[1].folder / "trials.csv"
+    trials.write_bytes(trials.read_bytes().replace(b"4", b"5", 1))
+    with pytest.raises(CollateError, match=r"trials.csv is not as its point wrote it"):
+        collate(points, tmp_path / "study")
+    assert {path: path.read_bytes() for path in (tmp_path / "study").rglob("*.*")} == before
+
+
+def test_listing_keeps_plan_and_tables_apart(settings: Settings, tmp_path: Path) -> None:
+    points = [finished(settings, tmp_path, seed=seed) for seed in (1, 0)]
+    folder = tmp_path / "study"
+    write_plan(folder, [(point, [f"seed={point.settings.seed}"]) for point in points])
+    planned = read_study(folder)
+    assert planned is not None
+    assert planned.points == {points[0].identity: ("seed=1",), points[1].identity: ("seed=0",)}
+    assert planned.collated is None
+    collate(points[::-1], folder)
+    listing = (folder / "study.json").read_bytes()
+    study = read_study(folder)
+    assert study is not None
+    assert study.points == planned.points
+    assert study.collated is not None
+    assert study.collated.points == (points[1].identity, points[0].identity)
+    for name, was in study.collated.tables.items():
+        assert digest((folder / "tables" / name).read_bytes()) == was
+    assert study.collated.started[0] <= study.collated.started[1]
+    # Another sweep that starts, and ends, in the same way.
+    write_plan(folder, [(point, [f"seed={point.settings.seed}"]) for point in points])
+    assert (folder / "study.json").read_bytes() == listing
+    collate(points, folder)
+    assert (folder / "study.json").read_bytes() == listing
+
+
+def test_listing_that_is_broken_is_told_and_written_anew(
+    settings: Settings, tmp_path: Path
+) -> None:
+    point = finished(settings, tmp_path)
+    path = tmp_path / "study" / "study.json"
+    path.parent.mkdir()
+    for content in ("{", "[]", '{"points": []}', '{"points": {}, "collated": {"points": []}}'):
+        path.write_text(content)
+        with pytest.raises(StudyError, match=r"study.json cannot be read"):
+            read_study(path.parent)
+    collate([point], path.parent)
+    study = read_study(path.parent)
+    assert study is not None
+    assert list(study.points) == [point.identity]
+    assert read_study(tmp_path / "elsewhere") is None

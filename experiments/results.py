@@ -1,0 +1,184 @@
+"""Look back at what was computed: python experiments/results.py COMMAND ..."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from experiments.archive import Archive, ArchiveError, KeptPoint, select
+from experiments.cleaning import leftovers
+from experiments.export import file_bytes, tidy_table
+from experiments.freshness import point_concerns
+from experiments.places import default_results
+from experiments.record import State
+from experiments.store import replace_file
+from experiments.study import Study
+from experiments.views import (
+    differences,
+    point_facts,
+    point_list,
+    study_facts,
+    study_list,
+    study_status,
+    summary_list,
+)
+
+
+def main() -> int:
+    """Run the command line.
+
+    Returns:
+        0; 2 if something that was asked for is not there.
+    """
+    chosen = _parser().parse_args()
+    archive = Archive((chosen.results or default_results()).resolve())
+    try:
+        for line in chosen.command(archive, chosen):
+            print(line)
+        sys.stdout.flush()
+    except ArchiveError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except BrokenPipeError:  # somebody has read enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument("--results", type=Path, help="folder of results", metavar="DIR")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def add(name: str, command: Any, text: str) -> argparse.ArgumentParser:
+        added = commands.add_parser(name, help=text, description=text, parents=[common])
+        added.set_defaults(command=command)
+        return added
+
+    one = add("list", _list, "studies; or the points of one, or with `points` all points")
+    one.add_argument("study", nargs="?", metavar="STUDY")
+    one.add_argument("--state", action="append", choices=list(State), help="only points in it")
+    one = add("status", _status, "what is done, and which tables and figures are up to date")
+    one.add_argument("study", nargs="?", metavar="STUDY")
+    one = add("show", _show, "config, record and results of a point or a study")
+    one.add_argument("name", metavar="POINT|STUDY", help="an identity's beginning is enough")
+    one = add("diff", _diff, "what differs between two points: config, versions, results")
+    one.add_argument("one", metavar="A")
+    one.add_argument("two", metavar="B")
+    one = add("query", _query, "finished points by config or summary, with their summary")
+    one.add_argument("conditions", nargs="+", metavar="KEY=VALUE", help="also 'dt<=0.25', != ...")
+    one.add_argument("--study", help="points of this study only")
+    one = add("export", _export, "one tidy table: each point's config, origin and measures")
+    one.add_argument("study", metavar="STUDY")
+    one.add_argument("--table", default="summary", help="whose rows; summary has one a point")
+    one.add_argument("--format", choices=["csv", "parquet"], default="csv")
+    one.add_argument("--out", type=Path, metavar="FILE", help="default: the terminal")
+    one = add("clean", _clean, "list what no study uses: points, stored stages, dead files")
+    one.add_argument("--yes", action="store_true", help="remove it")
+    return parser
+
+
+def _list(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+    """Studies, or points."""
+    if chosen.study is None and not chosen.state:
+        return study_list(archive, _width())
+    study = None if chosen.study in (None, "points") else archive.study(chosen.study)
+    return point_list(archive, study, chosen.state or (), _width())
+
+
+def _status(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+    """States of points, tables and figures, by study."""
+    if chosen.study:
+        yield from study_status(archive, archive.study(chosen.study))
+        return
+    yield from archive.unreadable
+    for study in archive.studies.values():
+        yield from study_status(archive, study)
+    if not archive.studies:
+        yield f"no study in {archive.results}"
+
+
+def _show(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+    """All about a point or a study."""
+    found = archive.find(chosen.name)
+    return study_facts(archive, found) if isinstance(found, Study) else point_facts(found)
+
+
+def _diff(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+    """What differs between two points."""
+    one, two = (_point(archive, name) for name in (chosen.one, chosen.two))
+    return differences(one, two, _width())
+
+
+def _query(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+    """Points that meet conditions, with their summary."""
+    everywhere = chosen.study is None
+    points = (
+        archive.points.values() if everywhere else archive.points_of(archive.study(chosen.study))
+    )
+    found = select([point for point in points if point.content], chosen.conditions)
+    if not found:
+        raise ArchiveError(f"no finished point has {' '.join(chosen.conditions)}")
+    return summary_list(found, _width())
+
+
+def _export(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+    """One table of a study."""
+    if chosen.format == "parquet" and chosen.out is None:
+        raise ArchiveError("--format parquet needs --out FILE: it is no text for a terminal")
+    points = archive.points_of(archive.study(chosen.study))
+    finished = [point for point in points if point.content]
+    if not finished:
+        raise ArchiveError(f"{chosen.study}: no point is finished; run the sweep first")
+    table = tidy_table(finished, chosen.table)
+    data = file_bytes(table, chosen.format)
+    if concerns := point_concerns(points):
+        print(f"{chosen.study}: {', '.join(concerns)}", file=sys.stderr)
+    if chosen.out is None:
+        yield data.decode().rstrip("\n")
+    else:
+        replace_file(chosen.out.resolve(), data)
+        yield f"written: {chosen.out} ({len(table)} rows, {table.shape[1]} columns)"
+
+
+def _clean(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+    """What no study uses; removed if told."""
+    found, notes = leftovers(archive)
+    yield from notes
+    total = 0
+    for leftover in found:
+        size = leftover.size
+        if chosen.yes and not leftover.remove():
+            yield f"kept: {leftover.what}: in use now"
+            continue
+        total += size
+        yield f"{'removed' if chosen.yes else 'unused'}: {leftover.what} ({size / 1e6:.2f} MB)"
+    if not found:
+        yield "nothing to clean"
+    elif chosen.yes:
+        yield f"{total / 1e6:.1f} MB freed"
+    else:
+        yield f"{len(found)} things, {total / 1e6:.1f} MB; nothing is removed without --yes"
+
+
+def _point(archive: Archive, name: str) -> KeptPoint:
+    """A point that was asked for."""
+    found = archive.find(name)
+    if isinstance(found, Study):
+        raise ArchiveError(f"{name}: is a study; give two points (see: list {name})")
+    return found
+
+
+def _width() -> int | None:
+    """Columns of the terminal; None where there is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,239 @@
+"""Sweeps under fire: killed again and again, two at once, and how much their tracking costs.
+
+Run by `make stress`; ends with an error at the first thing that is not as it must be.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import random
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+from filelock import FileLock
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from hydra import compose, initialize_config_dir
+from test_sweep import faulty, gone, running, start, tables
+
+import experiments.point
+from experiments import attempt, run
+from experiments.config import read_config
+from experiments.places import CONF
+from experiments.record import Point
+from experiments.store import Store
+from experiments.tables import collate
+from experiments.task import plain_tree
+
+KILLS = 20
+SEED = 2026
+# In each worker: whoever finishes a point says so, in a file that is only ever appended to.
+COUNTING = """
+from experiments import attempt as _attempt
+
+def _counted(point, *arguments, _keep=_attempt._keep_result):
+    _keep(point, *arguments)
+    with open("finished.txt", "a") as file:
+        file.write(point.identity + "\\n")
+
+_attempt._keep_result = _counted
+"""
+
+
+def folder_for(base: Path, name: str) -> tuple[Path, list[str]]:
+    """A new folder, and the sweep of 24 points of about a second in it."""
+    folder = base / name
+    folder.mkdir()
+    sweep = ["-m", *faulty(folder), "+system.fault=slow", "study=s", "workers=2"]
+    with open(folder / "faulty.py", "a") as file:
+        file.write(COUNTING)
+    return folder, [*sweep, "seed=0,1,2,3,4,5", "actions=2,3", "temperature=1,2"]
+
+
+def check_whole(folder: Path, points: int, expected: dict[str, bytes]) -> None:
+    """All points finished, each once; nothing is locked or half written; the tables are right."""
+    finished = Counter((folder / "finished.txt").read_text().split())
+    assert len(finished) == points, f"{len(finished)} of {points} points finished"
+    assert set(finished.values()) == {1}, f"finished more than once: {finished.most_common(3)}"
+    for path in (folder / "results").rglob("*.lock"):
+        with FileLock(path).acquire(blocking=False):
+            pass
+    left = [path for path in (folder / "results" / "points").rglob("*.part")]
+    assert not left, f"left behind: {left}"
+    if expected:
+        assert tables(folder, "s") == expected, "the tables differ from the undisturbed run's"
+
+
+def finish(folder: Path, sweep: list[str]) -> None:
+    """Run the sweep to its end."""
+    process = start(folder, *sweep)
+    out, err = process.communicate(timeout=600)
+    assert process.returncode == 0, f"{out}\n{err}"
+    assert gone(process.pid), "processes are left"
+
+
+def undisturbed(base: Path) -> dict[str, bytes]:
+    """The tables of a sweep that nobody disturbs, run once for all storms."""
+    if not (base / "calm").exists():
+        calm, sweep = folder_for(base, "calm")
+        finish(calm, sweep)
+        check_whole(calm, 24, {})
+    return tables(base / "calm", "s")
+
+
+def kill_storm(base: Path) -> None:
+    """Kill the parent and workers at random moments; resume; compare with an undisturbed run."""
+    chance = random.Random(SEED)
+    expected = undisturbed(base)
+    kills: Counter[str] = Counter()
+    slowest, storms = 0.0, 0
+    while kills.total() < KILLS:
+        storms += 1
+        folder, sweep = folder_for(base, f"storm{storms}")
+        while kills.total() < KILLS:
+            process = start(folder, *sweep)
+            time.sleep(chance.uniform(0.5, 8.0))
+            if process.poll() is not None:
+                break
+            victims = chance.choice(["parent", "worker", "workers", "all"])
+            group = pids(process.pid)
+            others = [pid for pid in group if pid != process.pid]
+            if victims == "worker":
+                others = chance.sample(others, min(1, len(others)))
+            if victims != "parent":
+                kill(others)
+                time.sleep(chance.uniform(0.0, 3.0))
+            if process.poll() is not None:
+                break
+            if victims == "all":
+                kill(pids(process.pid))
+            kill([process.pid])
+            began = time.monotonic()
+            process.communicate(timeout=60)
+            assert gone(process.pid, patience=10), f"orphans: {running(process.pid)}"
+            slowest = max(slowest, time.monotonic() - began)
+            kills[victims] += 1
+        finish(folder, sweep)
+        check_whole(folder, 24, expected)
+    print(
+        f"kill storm: {kills.total()} kills ({dict(kills)}) over {storms} sweeps of 24 points; "
+        f"tables equal; the last process was gone {slowest:.2f} s after its parent"
+    )
+
+
+def pids(group: int) -> list[int]:
+    """The live processes of a group."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            if os.getpgid(int(path.name)) == group:
+                found.append(int(path.name))
+        except ProcessLookupError:
+            continue
+    return found
+
+
+def kill(victims: list[int]) -> None:
+    """SIGKILL, each by its id."""
+    for pid in victims:
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            continue
+
+
+def two_at_once(base: Path) -> None:
+    """Two sweeps over the same points, started together."""
+    expected = undisturbed(base)
+    folder, sweep = folder_for(base, "two")
+    both = [start(folder, *sweep) for _ in range(2)]
+    outputs = [process.communicate(timeout=600) for process in both]
+    assert [process.returncode for process in both] == [0, 0], outputs
+    check_whole(folder, 24, expected)
+    shared = [len([line for line in out.splitlines() if line[:1] == "["]) for out, _ in outputs]
+    waited = sum("waiting for" in out for out, _ in outputs)
+    print(f"two sweeps at once: 24 points, each once; {shared} looked at, {waited} waited")
+
+
+def full_disk(base: Path) -> None:
+    """A disk that fills up while points are run, where this user may mount a small one."""
+    expected = undisturbed(base)
+    folder, sweep = folder_for(base, "full")
+    (folder / "results").mkdir()
+    if os.system(f"mount -t tmpfs -o size=1m tmpfs {folder / 'results'} 2>/dev/null"):
+        print("full disk: not tried, as this user may not mount")
+        return
+    try:
+        process = start(folder, *sweep)
+        _, err = process.communicate(timeout=600)
+        assert process.returncode == 1, err
+        assert "No space left on device" in err, err
+        assert not list((folder / "results").rglob("*.part"))
+        failed = err.partition(" points failed")[0].split("\n")[-1]
+        assert failed in [f"{count} of 24" for count in range(1, 24)], failed
+        assert not os.system(f"mount -o remount,size=100m {folder / 'results'}")
+        finish(folder, sweep)
+        check_whole(folder, 24, expected)
+        print(f"full disk: {failed} points failed, and finished once there was room")
+    finally:
+        os.system(f"umount {folder / 'results'}")
+
+
+def overhead(base: Path, limit: float = 0.5) -> None:
+    """Wall time of 200 trivial points with 2 workers, beyond their own work."""
+    folder = base / "overhead"
+    folder.mkdir()
+    began = time.monotonic()
+    process = start(folder, "-m", "temperature=range(1,201)", "study=s", "workers=2")
+    out, err = process.communicate(timeout=600)
+    wall = time.monotonic() - began
+    assert process.returncode == 0, f"{out}\n{err}"
+    records = [json.loads(path.read_bytes()) for path in folder.rglob("record.json")]
+    assert len(records) == 200
+    work = sum(record["seconds"]["total"] for record in records)
+    each = (wall - work / 2) / 200
+    print(f"overhead: {wall:.1f} s for 200 points, {work:.1f} s of it work: {each:.3f} s a point")
+    assert each < limit
+
+
+def collating(base: Path, limit: float = 5.0) -> None:
+    """Collating 2000 points, with tables of a tiny point."""
+    run.register_plugins()
+    with initialize_config_dir(str(CONF), **run.VERSION_BASE):
+        settings = read_config(plain_tree(compose("config", ["scale=smoke"])))[0]
+    tables_of_one = experiments.point.run_point(settings, Store(base / "store"), lambda line: None)
+    experiments.point.run_point = lambda *_: tables_of_one
+    points = [
+        Point(dataclasses.replace(settings, seed=seed), base / "collated") for seed in range(2000)
+    ]
+    for point in points:
+        attempt.run(point, lambda line: None)
+    size = sum(path.stat().st_size for path in points[0].folder.iterdir())
+    began = time.monotonic()
+    collate(points, base / "collated" / "s")
+    spent = time.monotonic() - began
+    print(f"collating: {spent:.2f} s for 2000 points of {size / 1000:.0f} kB")
+    assert spent < limit
+
+
+def main() -> None:
+    """Run all storms, or those that are named."""
+    sys.stdout.reconfigure(line_buffering=True)
+    base = Path(tempfile.mkdtemp(prefix="storm-"))
+    for storm in (overhead, collating, kill_storm, two_at_once, full_disk):
+        if sys.argv[1:] and storm.__name__ not in sys.argv[1:]:
+            continue
+        storm(base)
+    shutil.rmtree(base)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""Every file of conf/ does what it is for; a new one is covered without touching a test."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hydra import compose, initialize_config_dir
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from omegaconf import OmegaConf
+
+from experiments import run
+from experiments.config import read_config, read_recorded_config
+from experiments.places import CONF
+from experiments.planner import quote_options
+from experiments.task import plain_tree
+from paper_figures.__main__ import draw_study
+
+run.register_plugins()
+
+OPTIONS = {
+    f"{path.parent.relative_to(CONF)}={path.stem}": path for path in sorted(CONF.rglob("*/*.yaml"))
+}
+# What the smoke scale may set: numbers of trials, the horizon, and the study that the tables go to.
+SMALLER = {"study", "horizon", "rollouts", "demonstrations", "ranks"}
+
+
+def composed(*words: str, config: str = "config") -> Any:
+    """A config, Hydra's own part included."""
+    with initialize_config_dir(str(CONF), **run.VERSION_BASE):
+        return compose(config, [quote_options(word) for word in words], return_hydra_config=True)
+
+
+def companions(option: str) -> list[str]:
+    """The options that a system needs beside it, as the files of truths tell."""
+    group, _, name = option.partition("=")
+    if group == "system":
+        for truth in sorted((CONF / "truth").glob("*.yaml")):
+            word = f"truth={truth.stem}"
+            if composed(word).hydra.runtime.choices.system == name:
+                return [word]
+    return []
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_every_option_makes_a_point_that_can_run(option: str) -> None:
+    read_config(plain_tree(composed(option, *companions(option))))
+    if option.startswith(("system=", "truth=", "grid=")):
+        # What the file says is what the point gets.
+        content = yaml.safe_load(OPTIONS[option].read_text())
+        group = option.partition("=")[0]
+        given = content.get(group, content)
+        assert plain_tree(composed(option, *companions(option)))[group] == given
+
+
+@pytest.mark.parametrize("option", [name for name in OPTIONS if name.startswith(("sy", "gr"))])
+def test_every_option_suits_recorded_demonstrations(option: str) -> None:
+    read_recorded_config(plain_tree(composed(option, "demonstrations=x.csv", config="infer")))
+
+
+def test_every_group_is_in_the_defaults() -> None:
+    chosen = composed().hydra.runtime.choices
+    assert {option.partition("=")[0] for option in OPTIONS} <= set(chosen)
+
+
+def test_smoke_scale_touches_no_axis_and_no_system() -> None:
+    scale = OmegaConf.load(CONF / "scale" / "smoke.yaml")
+    for experiment in (CONF / "experiment").glob("*.yaml"):
+        swept = composed(f"experiment={experiment.stem}").hydra.sweeper.params
+        for key in swept:
+            assert OmegaConf.select(scale, str(key)) is None
+    hydra = scale.pop("hydra")
+    assert set(scale) <= SMALLER
+    assert OmegaConf.to_container(hydra) == {"sweeper": {"ends": True}}
+
+
+@pytest.mark.parametrize("experiment", [name for name in OPTIONS if name.startswith("experiment=")])
+def test_every_experiment_runs_small_and_is_drawn(experiment: str, tmp_path: Path) -> None:
+    script = CONF.parent / "experiments" / "run.py"
+    words = ["-m", experiment, "scale=smoke", f"results={tmp_path}"]
+    done = subprocess.run(
+        [sys.executable, str(script), *words], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    axes = composed(experiment).hydra.sweeper.params
+    points = 1
+    for override in OverridesParser.create().parse_overrides([f"{k}={v}" for k, v in axes.items()]):
+        key, values = override.key_or_group, [str(each) for each in override.sweep_iterator()]
+        points *= min(len(values), 2)
+        if len(values) > 2:  # a shortened axis is told, with the values that stand for it
+            told = next(line for line in done.stdout.splitlines() if line.startswith(f"{key}: "))
+            said = told.replace("'", "")
+            assert said.startswith(f"{key}: {values[0]} and {values[-1]} stand for all of")
+            assert said.endswith(", ".join(values))
+    assert f"{points} points: " in done.stdout
+    drawn = draw_study(tmp_path / "smoke")
+    assert drawn
+    assert all(path.stat().st_size > 1000 for path in drawn)
