@@ -101,6 +101,9 @@ class PoolLauncher(Launcher):
             self._show(bar, failures, [])
         finally:
             pool.stop()
+            # The pool closes its locks before its workers; one that still starts would complain.
+            for worker in multiprocessing.active_children():
+                worker.kill()
             pool.join()
             bar.close()
         return [returns[job] for job in jobs]

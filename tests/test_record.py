@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import subprocess
 import sys
 import time
@@ -10,17 +11,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import hopeless
 from hydra import compose, initialize_config_dir
 
 from experiments import attempt, run, surroundings
-from experiments import point as point_module
 from experiments.config import read_config
 from experiments.places import CONF
 from experiments.record import Point, State
 from experiments.settings import Settings
 from experiments.task import plain_tree
-
-run.register_plugins()
 
 # Changing this makes every point of every study anew: only when what a point is has changed.
 DEFAULT_POINT = "f065342a9a9fcafba06974083d07ddcf"
@@ -33,23 +32,15 @@ with FileLock(sys.argv[1]):
 """
 
 
-def settings(*overrides: str) -> Settings:
-    with initialize_config_dir(str(CONF), version_base="1.3"):
+def composed(*overrides: str) -> Settings:
+    run.register_plugins()
+    with initialize_config_dir(str(CONF), **run.VERSION_BASE):
         return read_config(plain_tree(compose("config", list(overrides))))[0]
 
 
 @pytest.fixture
-def point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Point:
-    """A point that costs nothing, and fails if its horizon is not 5 s."""
-
-    def run_point(settings: Settings, store, log) -> dict[str, pd.DataFrame]:
-        log("works")
-        if settings.horizon != 5:
-            raise RuntimeError("not five seconds")
-        return {"summary": pd.DataFrame([{"kept": np.int64(3), "error": 1 / 3, "floor": np.nan}])}
-
-    monkeypatch.setattr(point_module, "run_point", run_point)
-    return Point(settings(), tmp_path)
+def point(settings: Settings, tmp_path: Path) -> Point:
+    return Point(settings, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -62,27 +53,28 @@ def point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Point:
     ],
 )
 def test_identity_is_pinned_whatever_the_spelling(overrides: list[str]) -> None:
-    assert Point(settings(*overrides), Path()).identity == DEFAULT_POINT
+    assert Point(composed(*overrides), Path()).identity == DEFAULT_POINT
 
 
-def test_state_follows_a_point(point: Point, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_state_follows_a_point(point: Point) -> None:
     assert point.state() is State.MISSING
     assert not point.folder.exists()
     attempt.run(point, print)
     assert point.state() is State.DONE
-    monkeypatch.setattr("experiments.record.source_hash", lambda modules: "edited")
-    edited = Point(point.settings, point.results)
-    assert edited.state() is State.STALE
-    attempt.run(edited, print)
-    assert edited.state() is State.DONE
-    assert edited.record()["attempt"] == 2
-    wrong = Point(dataclasses.replace(point.settings, horizon=4.0), point.results)
-    with pytest.raises(RuntimeError):
+    record = point.folder / "record.json"
+    record.write_text(json.dumps(json.loads(record.read_text()) | {"source": "before an edit"}))
+    assert point.state() is State.STALE
+    attempt.run(point, print)
+    assert point.state() is State.DONE
+    assert point.record()["source"] == point.source
+    assert point.record()["attempt"] == 2
+    wrong = Point(hopeless(point.settings), point.results)
+    with pytest.raises(RuntimeError, match="no demonstration was kept") as caught:
         attempt.run(wrong, print)
     assert wrong.state() is State.FAILED
     failure = wrong.failure()
     assert (failure["reason"], failure["attempt"]) == ("raised", 1)
-    assert failure["error"] == "RuntimeError: not five seconds"
+    assert failure["error"] == f"RuntimeError: {caught.value}"
     assert "in run_point" in failure["traceback"]
 
 
@@ -118,32 +110,58 @@ def test_attempt_clears_what_a_killed_one_left(point: Point) -> None:
     attempt.run(point, print)
     assert point.record()["attempt"] == 5
     assert {path.name for path in point.folder.iterdir()} == {
-        *("summary.csv", "log.txt", "record.json", ".lock")
+        *("trials.csv", "ranks.csv", "rank_quantiles.csv", "hypotheses.csv", "summary.csv"),
+        *("attempts.csv", "paths.csv", "dimensions.csv", "log.txt", "record.json", ".lock"),
     }
 
 
 def test_full_disk_is_a_failure_like_others(point: Point, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(path: Path, data: bytes) -> None:
-        if path.name != "attempt.json":
-            raise OSError(28, "No space left on device")
+    replace = os.replace
+    refused = []
 
-    monkeypatch.setattr(attempt, "replace_file", refuse)
-    with pytest.raises(OSError, match="No space left"):
+    def refuse(source: str, target: Path) -> None:
+        if target.parent == point.folder and target.name != "attempt.json":
+            refused.append(target.name)
+            raise OSError(28, "No space left on device", str(target))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(OSError, match=r"No space left.*attempts.csv"):
         attempt.run(point, print)
     assert point.state() is State.MISSING  # there was no room to say more
+    assert refused == ["attempts.csv", "failure.json"]
+
+
+def summary_row(point: Point) -> dict[str, float | None]:
+    """What the point's own table holds, with None where it has no number."""
+    table = pd.read_csv(point.folder / "summary.csv")
+    (row,) = table.drop(columns=list(point.settings.columns)).to_dict("records")
+    return {name: None if np.isnan(value) else value for name, value in row.items()}
 
 
 def test_record_says_what_a_result_comes_from(point: Point) -> None:
     attempt.run(point, print)
     record = point.record()
-    assert record["config"]["grid"] == {"shape": [20, 20]}
-    assert record["summary"] == {"kept": 3, "error": 1 / 3, "floor": None}
+    assert record["config"]["grid"] == {"shape": [12, 8]}
+    assert record["summary"] == summary_row(point)
+    assert record["summary"]["kept"] == 4
+    assert record["summary"]["final_state_error"] > 0
     wanted = {"identity", "source", "seed", "files", "stages", "attempt", "started", "seconds"}
     wanted |= {"git", "host", "system", "cpu", "cores", "blas_threads", "python", "packages"}
     assert wanted <= set(record)
     assert record["packages"]["numpy"] == np.__version__
     assert record["blas_threads"] == "1"
     assert 10 < record["peak_memory_mb"] < 10_000
+
+
+def test_record_has_null_where_a_summary_has_no_number(point: Point) -> None:
+    # In so short a step no action leaves its cell, and no goal can be reached.
+    still = Point(dataclasses.replace(point.settings, dt=0.05), point.results)
+    attempt.run(still, print)
+    record = still.record()
+    assert record["summary"] == summary_row(still)
+    assert record["summary"]["feasible"] == 0
+    assert record["summary"]["final_state_error"] is None
 
 
 def test_peak_memory_is_that_of_the_point_alone() -> None:

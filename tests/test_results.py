@@ -1,5 +1,6 @@
 """Looking back: what the command line tells of a folder of results, and what it removes."""
 
+import csv
 import dataclasses
 import io
 import json
@@ -11,44 +12,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from hydra import compose, initialize_config_dir
+from conftest import hopeless
 
-from experiments import attempt, results, run
-from experiments import point as point_module
-from experiments.config import read_config
-from experiments.places import CONF
+from experiments import attempt, results
 from experiments.record import Point
 from experiments.settings import Settings
-from experiments.store import Store
 from experiments.study import write_plan
 from experiments.tables import collate
-from experiments.task import plain_tree
 from paper_figures.origin import table_digest, write_note
 
-run.register_plugins()
-
-
-@pytest.fixture(scope="module")
-def settings() -> Settings:
-    with initialize_config_dir(str(CONF), **run.VERSION_BASE):
-        return read_config(plain_tree(compose("config")))[0]
-
-
-@pytest.fixture(autouse=True)
-def tiny_point(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Points that cost nothing; dt = 0.5 fails, and each truth has a stored stage."""
-
-    def run_point(settings: Settings, store: Store, log) -> dict[str, pd.DataFrame]:
-        log(f"dt is {settings.dt}")
-        if settings.dt == 0.5:
-            raise RuntimeError("half a second is too much")
-        store.get("safe_set", settings.seed, [], lambda: {"values": np.arange(3.0)})
-        return {
-            "trials": pd.DataFrame({"trial": range(3), "error": np.arange(3) / 3}),
-            "summary": pd.DataFrame([{"error": settings.dt / 3}]),
-        }
-
-    monkeypatch.setattr(point_module, "run_point", run_point)
+TABLES = "attempts, dimensions, hypotheses, paths, rank_quantiles, ranks, summary, trials"
 
 
 def finished(settings: Settings, folder: Path, **changes: object) -> Point:
@@ -59,10 +32,29 @@ def finished(settings: Settings, folder: Path, **changes: object) -> Point:
 
 def swept(settings: Settings, folder: Path, study: str, **values: float) -> list[Point]:
     """A study of finished points, collated."""
-    points = [finished(settings, folder, dt=dt, seed=values.get("seed", 0)) for dt in (1.0, 0.25)]
+    points = [finished(settings, folder, dt=dt, seed=values.get("seed", 0)) for dt in (1.0, 0.5)]
     write_plan(folder / study, [(point, [f"dt={point.settings.dt}"]) for point in points])
     collate(points, folder / study)
     return points
+
+
+def outdate(point: Point) -> None:
+    """Leave a finished point as an older version of the source would have."""
+    path = point.folder / "record.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "source": "another"}))
+
+
+def spelt(table: Path) -> list[dict[str, str]]:
+    """The rows of a table on disk, every value as it is spelt there."""
+    parquet = table.suffix == ".parquet"
+    text = pd.read_parquet(table).to_csv(index=False) if parquet else table.read_text()
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def summary(point: Point) -> dict[str, str]:
+    """The point's own summary."""
+    (only,) = spelt(point.folder / "summary.csv")
+    return only
 
 
 def ask(
@@ -88,23 +80,24 @@ def row(text: str, start: str) -> list[str]:
 
 def test_every_state_is_counted(settings: Settings, tmp_path: Path, look) -> None:
     done, stale = swept(settings, tmp_path, "s")
-    record = json.loads((stale.folder / "record.json").read_text())
-    (stale.folder / "record.json").write_text(json.dumps({**record, "source": "another"}))
-    failed = Point(dataclasses.replace(settings, dt=0.5), tmp_path)
-    with pytest.raises(RuntimeError):
+    outdate(stale)
+    failed = Point(dataclasses.replace(hopeless(settings), dt=0.25), tmp_path)
+    with pytest.raises(RuntimeError, match="no demonstration was kept"):
         attempt.run(failed, print)
     running = Point(dataclasses.replace(settings, dt=0.2), tmp_path)
     running.folder.mkdir()
     missing = Point(dataclasses.replace(settings, dt=0.1), tmp_path)
     points = [done, stale, failed, running, missing]
     write_plan(tmp_path / "s", [(point, [f"dt={point.settings.dt}"]) for point in points])
+    tables = sorted(path.name for path in (tmp_path / "s" / "tables").iterdir())
+    assert tables == sorted(path.name for path in done.folder.glob("*.csv"))
     with running.lock:
         status, out, _ = look("list")
         assert status == 0
         assert row(out, "study") == [
             *("study", "points", "done", "stale", "failed", "running", "missing", "tables")
         ]
-        assert row(out, "s ") == ["s", "5", "1", "1", "1", "1", "1", "2"]
+        assert row(out, "s ") == ["s", "5", "1", "1", "1", "1", "1", str(len(tables))]
         _, out, _ = look("list", "s")
         for point, state in zip(
             points, ["done", "stale", "failed", "running", "missing"], strict=True
@@ -117,20 +110,20 @@ def test_every_state_is_counted(settings: Settings, tmp_path: Path, look) -> Non
             failed.identity[:12],
         ]
     _, out, _ = look("show", failed.identity[:12])
-    assert "half a second is too much" in out
+    assert "RuntimeError: no demonstration was kept" in out
     assert out.count("Traceback") == 2  # of the failure, and in the log
 
 
 @pytest.mark.parametrize(
     ("conditions", "dts"),
     [
-        (["dt<=0.25"], [0.25]),
-        (["dt>0.25"], [1.0]),
-        (["dt=1,0.25"], [0.25, 1.0]),
-        (["dt!=1"], [0.25]),
-        (["truth=c1", "cells>=400", "actions=9"], [0.25, 1.0]),
-        (["grid.shape=[20,20]", "truth.name=c1", "error<0.1"], [0.25]),
-        (["system.target=mlci.systems.Pendulum", "dt<1"], [0.25]),
+        (["dt<=0.5"], [0.5]),
+        (["dt>0.5"], [1.0]),
+        (["dt=1,0.5"], [0.5, 1.0]),
+        (["dt!=1"], [0.5]),
+        (["truth=wall", "cells>=96", "actions=3"], [0.5, 1.0]),
+        (["grid.shape=[12,8]", "truth.name=wall", "cells_crossed<2"], [0.5]),
+        (["system.target=mlci.systems.DoubleIntegrator", "dt<1"], [0.5]),
         (["safety.margin=null", "dt>=1"], [1.0]),
     ],
 )
@@ -138,6 +131,8 @@ def test_query_finds_by_config_and_summary(
     conditions: list[str], dts: list[float], settings: Settings, tmp_path: Path, look
 ) -> None:
     points = swept(settings, tmp_path, "s")
+    crossed = {point.settings.dt: float(summary(point)["cells_crossed"]) for point in points}
+    assert crossed[0.5] < 2 < crossed[1.0]
     status, out, _ = look("query", *conditions)
     assert status == 0
     for point in points:
@@ -148,13 +143,17 @@ def test_show_tells_config_record_and_results(settings: Settings, tmp_path: Path
     points = swept(settings, tmp_path, "s")
     status, out, _ = look("show", points[0].identity[:9])
     assert status == 0
-    assert row(out, "  grid.shape") == ["grid.shape", "[20,", "20]"]
+    assert row(out, "  grid.shape") == ["grid.shape", "[12,", "8]"]
     assert row(out, "  packages.numpy") == ["packages.numpy", np.__version__]
-    assert row(out, "  error")[1] == str(1 / 3)
-    assert "  dt is 1.0" in out.splitlines()
+    error = summary(points[0])["final_state_error"]
+    assert 0 < float(error) < 1
+    assert row(out, "  final_state_error") == ["final_state_error", error]
+    log = (points[0].folder / "log.txt").read_text().splitlines()
+    assert log[0].startswith("demonstrations  4 of 6 kept")
+    assert out.splitlines()[-len(log) - 1 :] == ["log", *(f"  {line}" for line in log)]
     _, out, _ = look("show", "s")
     assert "s: 2 points: 2 done" in out
-    assert row(out, "  dt ") == ["dt", "1.0,", "0.25"]
+    assert row(out, "  dt ") == ["dt", "1.0,", "0.5"]
 
 
 def test_diff_shows_what_differs_and_nothing_else(settings: Settings, tmp_path: Path, look) -> None:
@@ -165,10 +164,15 @@ def test_diff_shows_what_differs_and_nothing_else(settings: Settings, tmp_path: 
     status, out, _ = look("diff", one.identity[:12], two.identity[:12])
     assert status == 0
     assert "config: 1 differs" in out
-    assert row(out, "  dt") == ["dt", "1.0", "0.25"]
+    assert row(out, "  dt") == ["dt", "1.0", "0.5"]
     assert row(out, "  python")[2] == "3.99"
-    assert row(out, "  error") == ["error", str(1 / 3), str(0.25 / 3)]
+    errors = [summary(point)["final_state_error"] for point in (one, two)]
+    assert errors[0] != errors[1]
+    assert row(out, "  final_state_error") == ["final_state_error", *errors]
     assert "trials.csv" in out
+    assert "attempts.csv" not in out
+    assert summary(one)["pairs"] == summary(two)["pairs"]
+    assert "  pairs" not in out
     assert "grid.shape" not in out
     assert "packages.numpy" not in out
 
@@ -182,12 +186,19 @@ def test_export_is_one_exact_table(form: str, settings: Settings, tmp_path: Path
     assert "2 rows" in text
     table = pd.read_csv(out) if form == "csv" else pd.read_parquet(out)
     assert table["point"].tolist() == [point.identity for point in points]
-    assert table["error"].tolist() == [1.0 / 3, 0.25 / 3]
-    assert table["config.dt"].tolist() == table["dt"].tolist() == [1.0, 0.25]
+    assert table["config.dt"].tolist() == table["dt"].tolist() == [1.0, 0.5]
     assert set(table["state"]) == {"done"}
+    assert all(0 < error < 1 for error in table["final_state_error"].tolist())
+    assert_holds(out, [point.folder / "summary.csv" for point in points])
     look("export", "s", "--format", form, "--out", str(out), "--table", "trials")
-    table = pd.read_csv(out) if form == "csv" else pd.read_parquet(out)
-    assert table["error"].tolist() == [0, 1 / 3, 2 / 3] * 2
+    assert_holds(out, [point.folder / "trials.csv" for point in points])
+
+
+def assert_holds(table: Path, parts: list[Path]) -> None:
+    """The table's rows are exactly those of its parts, in turn, beside other columns."""
+    rows = [row for part in parts for row in spelt(part)]
+    assert len({row["final_state_error"] for row in rows} - {""}) > 1
+    assert [{key: line[key] for key in rows[0]} for line in spelt(table)] == rows
 
 
 def test_export_to_the_terminal_is_csv(settings: Settings, tmp_path: Path, look) -> None:
@@ -203,13 +214,13 @@ def test_export_to_the_terminal_is_csv(settings: Settings, tmp_path: Path, look)
         (["show", "zz"], "no such study or point"),
         (["show", "0" * 31], "no such study or point"),
         (["list", "smoek"], "did you mean smoke?"),
-        (["export", "smoke", "--table", "trails"], "no such table; there are summary, trials"),
+        (["export", "smoke", "--table", "trails"], f"no such table; there are {TABLES}"),
         (["export", "smoke", "--format", "parquet"], "needs --out"),
         (["diff", "smoke", "smoke"], "is a study"),
         (["query", "dtt=1"], "did you mean dt?"),
         (["query", "dt<"], "cannot be read"),
         (["query", "dt=7"], "no finished point has dt=7"),
-        (["query", "dt!=1,0.25"], "no finished point has dt!=1,0.25"),
+        (["query", "dt!=1,0.5"], "no finished point has dt!=1,0.5"),
     ],
 )
 def test_mistakes_are_told_in_a_line(
@@ -250,7 +261,8 @@ def test_clean_removes_what_no_study_uses_and_only_when_told(
     assert status == 0
     assert everything(tmp_path) == before
     assert f"unused: point {loose.identity[:12]}, in no study" in out
-    assert "unused: stored safe_set" in out
+    stored = json.loads((loose.folder / "record.json").read_text())["stages"]["demonstrations"]
+    assert f"unused: stored demonstrations {stored[:12]}" in out
     assert out.count("unused:") == 3
     look("clean", "--yes")
     assert everything(tmp_path) == used
@@ -344,7 +356,6 @@ def test_status_tells_why_not(
     settings: Settings,
     tmp_path: Path,
     look,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     points = swept(settings, tmp_path, "s")
     drawn(tmp_path / "s")
@@ -356,9 +367,12 @@ def test_status_tells_why_not(
     elif harm == "unplot":
         (tmp_path / "s" / "figures" / "curve.pdf").unlink()
     elif harm == "edit":
-        monkeypatch.setattr("paper_figures.origin.drawing_source", lambda: "edited")
+        note = tmp_path / "s" / "figures" / "figures.json"
+        note.write_text(json.dumps({**json.loads(note.read_text()), "drawn_by": "another"}))
     elif harm == "stale":
-        monkeypatch.setattr("experiments.record.source_hash", lambda modules: "edited")
+        for point in points:
+            outdate(point)
+        collate(points, tmp_path / "s")
     elif harm == "rerun":
         attempt.run(points[0], print, force=True)
     else:

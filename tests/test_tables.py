@@ -1,50 +1,27 @@
 """Points on disk, and tables that hold exactly what points wrote."""
 
+import csv
 import dataclasses
+import io
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from hydra import compose, initialize_config_dir
+from conftest import hopeless
 
-from experiments import attempt, run
-from experiments import point as point_module
-from experiments.config import read_config
-from experiments.places import CONF
+from experiments import attempt
+from experiments.measures import TRUTH_TABLES
+from experiments.point import run_point
 from experiments.record import Point
 from experiments.settings import Settings
 from experiments.store import Store, digest
 from experiments.study import StudyError, read_study, write_plan
-from experiments.tables import CollateError, collate
-from experiments.task import plain_tree
+from experiments.tables import CollateError, collate, csv_bytes, table_bytes
 
-run.register_plugins()
-
-NUMBERS = np.array([1 / 3, 1e-300, np.nan, -0.1, 2**53 + 1.0])
-
-
-@pytest.fixture(scope="module")
-def settings() -> Settings:
-    with initialize_config_dir(str(CONF), **run.VERSION_BASE):
-        return read_config(plain_tree(compose("config")))[0]
-
-
-@pytest.fixture(autouse=True)
-def tiny_point(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Points that cost nothing."""
-
-    def run_point(settings: Settings, store: Store, log) -> dict[str, pd.DataFrame]:
-        log(f"dt is {settings.dt}")
-        if settings.dt == 0.5:
-            raise RuntimeError("half a second is too much")
-        return {
-            "trials": pd.DataFrame({"trial": range(5), "error": NUMBERS * settings.seed}),
-            "attempts": pd.DataFrame({"truth": settings.truth.name, "cost": [1.5, settings.seed]}),
-        }
-
-    monkeypatch.setattr(point_module, "run_point", run_point)
+NUMBERS = [1 / 3, 1e-300, 5e-324, -0.1, -0.0, 2**53 + 1.0, np.nextafter(1, 2), np.inf, np.nan]
 
 
 def finished(settings: Settings, results: Path, **changes: object) -> Point:
@@ -53,25 +30,62 @@ def finished(settings: Settings, results: Path, **changes: object) -> Point:
     return point
 
 
+def rewrite_record(point: Point, **changes: object) -> None:
+    path = point.folder / "record.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+
+def joined(name: str, points: Sequence[Point], extra: str = "", values: Sequence[str] = ()) -> str:
+    """The points' own tables one after the other, with columns in front of them."""
+    tables = [(point.folder / name).read_text().splitlines(keepends=True) for point in points]
+    rows = [
+        value + row
+        for table, value in zip(tables, values or [""] * len(tables), strict=True)
+        for row in table[1:]
+    ]
+    assert len(rows) >= len(points)
+    return "".join([extra + tables[0][0], *rows])
+
+
 def test_finished_point_has_a_record_and_exact_tables(settings: Settings, tmp_path: Path) -> None:
     point = finished(settings, tmp_path, seed=1)
     assert point.is_done()
     table = pd.read_csv(point.folder / "trials.csv")
     assert list(table.columns[:5]) == ["truth", "cells", "actions", "dt", "samples"]
-    assert table.iloc[0, :5].tolist() == ["c1", 400, 9, 0.25, 1]
-    np.testing.assert_array_equal(table["error"], NUMBERS)
+    assert table.iloc[0, :5].tolist() == ["wall", 96, 3, 0.5, 1]
+    lines: list[str] = []
+    computed = run_point(point.settings, Store(tmp_path / "store"), lines.append)
+    assert {path.stem for path in point.folder.glob("*.csv")} == set(computed)
+    for name, frame in computed.items():
+        table = pd.read_csv(point.folder / f"{name}.csv")
+        opening = 1 if name in TRUTH_TABLES else 5
+        assert list(table.columns[opening:]) == list(frame.columns)
+        for column in frame.columns:
+            np.testing.assert_array_equal(table[column], frame[column])
     record = json.loads((point.folder / "record.json").read_text())
     assert record["identity"] == point.folder.name
-    assert record["config"]["grid"] == {"shape": [20, 20]}
+    assert record["config"]["grid"] == {"shape": [12, 8]}
     assert record["seconds"]["total"] >= 0
     assert record["packages"]["numpy"] == np.__version__
-    assert (point.folder / "log.txt").read_text() == "dt is 0.25\n"
+    assert lines
+    assert (point.folder / "log.txt").read_text() == "".join(f"{line}\n" for line in lines)
+
+
+def test_floats_are_exact_in_tables(settings: Settings) -> None:
+    frame = pd.DataFrame({"truth": "other", "trial": range(len(NUMBERS)), "error": NUMBERS})
+    for data, truth in [
+        (csv_bytes(frame), "other"),
+        (table_bytes("trials", frame, settings), "wall"),
+    ]:
+        rows = list(csv.DictReader(io.StringIO(data.decode())))
+        assert [row["truth"] for row in rows] == [truth] * len(NUMBERS)
+        kept = [float(row["error"] or "nan") for row in rows]
+        # As bits: 0.0 is not -0.0 there, and NaN is itself.
+        assert np.array(kept).tobytes() == np.array(NUMBERS).tobytes()
 
 
 @pytest.mark.parametrize("harm", ["table", "record", "source", "missing"])
-def test_point_that_is_not_whole_is_not_done(
-    harm: str, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_point_that_is_not_whole_is_not_done(harm: str, settings: Settings, tmp_path: Path) -> None:
     point = finished(settings, tmp_path)
     if harm == "table":
         (point.folder / "trials.csv").write_text("trial\n")
@@ -80,55 +94,70 @@ def test_point_that_is_not_whole_is_not_done(
     elif harm == "missing":
         (point.folder / "trials.csv").unlink()
     else:
-        monkeypatch.setattr("experiments.record.source_hash", lambda modules: "edited")
+        rewrite_record(point, source="edited")
     assert not Point(settings, tmp_path).is_done()
 
 
 def test_point_that_fails_is_not_done_and_keeps_its_traceback(
     settings: Settings, tmp_path: Path
 ) -> None:
-    with pytest.raises(RuntimeError, match="half a second"):
-        finished(settings, tmp_path, dt=0.5)
-    point = Point(dataclasses.replace(settings, dt=0.5), tmp_path)
-    assert not point.is_done()
-    log = (point.folder / "log.txt").read_text()
-    assert log.startswith("dt is 0.5\nTraceback")
-    assert "half a second is too much" in log
+    point = Point(hopeless(settings), tmp_path)
+    with pytest.raises(RuntimeError, match="no demonstration was kept"):
+        attempt.run(point, print)
+    assert not Point(point.settings, tmp_path).is_done()
+    first, second, *rest = (point.folder / "log.txt").read_text().splitlines()
+    assert first.startswith("demonstrations  0 of 6 kept")
+    assert second.startswith("Traceback")
+    assert rest[-1].startswith("RuntimeError: no demonstration was kept")
 
 
 def test_collate_sorts_by_size_whatever_the_order(settings: Settings, tmp_path: Path) -> None:
-    grids = [dataclasses.replace(settings.grid, shape=shape) for shape in [(40, 40), (20, 20)]]
-    points = [finished(settings, tmp_path, grid=grid, dt=dt) for grid in grids for dt in [1.0, 0.1]]
+    grids = [dataclasses.replace(settings.grid, shape=shape) for shape in [(16, 12), (12, 8)]]
+    points = [
+        finished(settings, tmp_path, grid=grid, dt=dt) for grid in grids for dt in [1.0, 0.25]
+    ]
     collate(points, tmp_path / "one")
     collate(points[::-1], tmp_path / "two")
-    for name in ["trials.csv", "attempts.csv"]:
+    names = {path.name for path in points[0].folder.glob("*.csv")}
+    assert {path.name for path in (tmp_path / "one" / "tables").iterdir()} == names
+    for name in names:
         one, two = (tmp_path / study / "tables" / name for study in ["one", "two"])
         assert one.read_bytes() == two.read_bytes()
-    table = pd.read_csv(tmp_path / "one" / "tables" / "trials.csv")
-    order = [(400, 0.1), (400, 1.0), (1600, 0.1), (1600, 1.0)]
+        # What depends on the truth alone stands once.
+        rows = points[:1] if Path(name).stem in TRUTH_TABLES else points[::-1]
+        assert one.read_text() == joined(name, rows)
+    table = pd.read_csv(tmp_path / "one" / "tables" / "hypotheses.csv")
+    order = [(96, 0.25), (96, 1.0), (192, 0.25), (192, 1.0)]
     assert list(zip(table["cells"], table["dt"], strict=True)) == [
-        pair for pair in order for _ in range(5)
+        pair for pair in order for _ in range(10)
     ]
-    assert table["trial"].tolist() == list(range(5)) * 4
-    # What depends on the truth alone stands once.
-    assert len(pd.read_csv(tmp_path / "one" / "tables" / "attempts.csv")) == 2
+    assert table["hypothesis"].tolist() == list(range(10)) * 4
+    assert len(pd.read_csv(tmp_path / "one" / "tables" / "attempts.csv")) == 6
 
 
 def test_collate_adds_columns_that_tell_points_apart(settings: Settings, tmp_path: Path) -> None:
-    flat = dataclasses.replace(settings.grid, shape=(10, 40))
+    flat = dataclasses.replace(settings.grid, shape=(24, 4))
     points = [
         finished(settings, tmp_path, seed=1),
-        finished(settings, tmp_path, seed=0),
         finished(settings, tmp_path, seed=0, grid=flat),
+        finished(settings, tmp_path, seed=0),
     ]
     collate(points, tmp_path / "study")
-    table = pd.read_csv(tmp_path / "study" / "tables" / "trials.csv")
+    tables = tmp_path / "study" / "tables"
+    ordered = [points[2], points[0], points[1]]
+    values = ['"[12, 8]",0,', '"[12, 8]",1,', '"[24, 4]",0,']
+    for name in ["trials.csv", "ranks.csv", "hypotheses.csv", "summary.csv"]:
+        expected = joined(name, ordered, "grid.shape,seed,", values)
+        assert (tables / name).read_text() == expected
+    table = pd.read_csv(tables / "hypotheses.csv")
     assert list(table.columns[:3]) == ["grid.shape", "seed", "truth"]
-    assert table["grid.shape"].tolist() == ["[10, 40]"] * 5 + ["[20, 20]"] * 10
-    assert table["seed"].tolist() == [0] * 10 + [1] * 5
-    attempts = pd.read_csv(tmp_path / "study" / "tables" / "attempts.csv")
-    assert list(attempts.columns) == ["seed", "truth", "cost"]
-    assert attempts["seed"].tolist() == [0, 0, 1, 1]
+    assert table["grid.shape"].tolist() == ["[12, 8]"] * 20 + ["[24, 4]"] * 10
+    assert table["seed"].tolist() == [0] * 10 + [1] * 10 + [0] * 10
+    # Both grids have the same attempts, which stand once a seed.
+    attempts = (tables / "attempts.csv").read_text()
+    assert attempts == joined("attempts.csv", ordered[:2], "seed,", ["0,", "1,"])
+    assert pd.read_csv(tables / "attempts.csv")["seed"].tolist() == [0] * 6 + [1] * 6
+    assert (tables / "dimensions.csv").read_text() == joined("dimensions.csv", points[:1])
 
 
 def test_collate_refuses_an_unfinished_point(settings: Settings, tmp_path: Path) -> None:
@@ -138,33 +167,27 @@ def test_collate_refuses_an_unfinished_point(settings: Settings, tmp_path: Path)
     assert not (tmp_path / "study").exists()
 
 
-def test_collate_refuses_a_mixture_of_sources(
-    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    old = finished(settings, tmp_path)
-    monkeypatch.setattr("experiments.record.source_hash", lambda modules: "edited")
-    new = finished(settings, tmp_path, seed=1)
+def test_collate_refuses_a_mixture_of_sources(settings: Settings, tmp_path: Path) -> None:
+    old, new = (finished(settings, tmp_path, seed=seed) for seed in (0, 1))
+    rewrite_record(old, source="edited")
     with pytest.raises(CollateError, match="different versions of the source"):
         collate([old, new], tmp_path / "study")
 
 
-def test_collate_refuses_other_columns(
-    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    one = finished(settings, tmp_path)
-    other = {"trials": pd.DataFrame({"trial": [1]}), "attempts": pd.DataFrame({"cost": [1]})}
-    monkeypatch.setattr(point_module, "run_point", lambda *_: other)
-    two = finished(settings, tmp_path, seed=1)
+def test_collate_refuses_other_columns(settings: Settings, tmp_path: Path) -> None:
+    one, two = (finished(settings, tmp_path, seed=seed) for seed in (0, 1))
+    record, trials = two.record(), two.folder / "trials.csv"
+    assert record is not None
+    trials.write_bytes(csv_bytes(pd.read_csv(trials).drop(columns="violation_floor")))
+    rewrite_record(two, files=record["files"] | {"trials.csv": digest(trials.read_bytes())})
+    assert two.is_done()
     with pytest.raises(CollateError, match=r"the columns of .*trials.csv are"):
         collate([one, two], tmp_path / "study")
 
 
-def test_collate_mixes_sources_when_told_and_lists_them(
-    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    points = [finished(settings, tmp_path, seed=seed) for seed in (0, 1)]
-    monkeypatch.setattr("experiments.record.source_hash", lambda modules: "edited")
-    points.append(finished(settings, tmp_path, seed=2))
+def test_collate_mixes_sources_when_told_and_lists_them(settings: Settings, tmp_path: Path) -> None:
+    points = [finished(settings, tmp_path, seed=seed) for seed in (0, 1, 2)]
+    rewrite_record(points[2], source="edited")
     with pytest.raises(CollateError, match=rf"edited: 1 points, such as {points[2].identity}"):
         collate(points, tmp_path / "study")
     collate(points, tmp_path / "study", mixed=True)
@@ -180,7 +203,7 @@ def test_refused_collate_leaves_all_old_tables(settings: Settings, tmp_path: Pat
     collate(points[:1], tmp_path / "study")
     before = {path: path.read_bytes() for path in (tmp_path / "study").rglob("*.*")}
     trials = points[1].folder / "trials.csv"
-    trials.write_bytes(trials.read_bytes().replace(b"4", b"5", 1))
+    trials.write_bytes(trials.read_bytes().replace(b"wall", b"well", 1))
     with pytest.raises(CollateError, match=r"trials.csv is not as its point wrote it"):
         collate(points, tmp_path / "study")
     assert {path: path.read_bytes() for path in (tmp_path / "study").rglob("*.*")} == before
