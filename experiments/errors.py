@@ -99,7 +99,8 @@ def gather(problems: Mapping[str, Sequence[str]], total: int) -> str:
 def job_names(jobs: Sequence[Sequence[str]]) -> list[str]:
     """What tells each job from the others, as a person would type it."""
     shared = set(jobs[0]).intersection(*jobs) if len(jobs) > 1 else set()
-    return [" ".join(part for part in job if part not in shared).replace("'", "") for job in jobs]
+    names = [" ".join(part for part in job if part not in shared) for job in jobs]
+    return [name.replace("'", "") or "defaults" for name in names]
 
 
 def describe_failures(outcome: Outcome, total: int) -> str:

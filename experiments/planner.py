@@ -11,9 +11,10 @@ from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.plugins import Plugins
+from hydra.errors import HydraException
 from hydra.plugins.sweeper import Sweeper
 from hydra.types import HydraContext, TaskFunction
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 from tqdm import tqdm
 
 from experiments.config import ConfigError, read_config
@@ -33,15 +34,25 @@ class SweepFailed(Exception):
 
 
 class Planner(Sweeper):
-    """All combinations of the swept values, as one batch for any launcher.
+    """All combinations of the swept values, each with every case, as one batch for any launcher.
 
     Attributes:
         params: values that an experiment sweeps, by key: "1,2,3".
-        ends: of each of these take the first and the last value only, and say so.
+        cases: lists of overrides that go together, such as [actions=9, seed=1]; [] changes nothing.
+        ends: of each of the params take the first and the last value only, and say so.
+
+    Raises:
+        ValueError: cases that are not lists of overrides.
     """
 
-    def __init__(self, params: Mapping[str, str] | None = None, ends: bool = False) -> None:
+    def __init__(
+        self,
+        params: Mapping[str, str] | None = None,
+        cases: Sequence[Sequence[str]] | None = None,
+        ends: bool = False,
+    ) -> None:
         self.params, self.ends = dict(params or {}), ends
+        self.cases = _read_cases(cases or [[]])
 
     def setup(
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
@@ -87,6 +98,8 @@ class Planner(Sweeper):
     def _jobs(self, arguments: list[str]) -> list[list[str]]:
         """The overrides of every point; the command line wins over the experiment's own."""
         parser = OverridesParser.create(config_loader=self._loader)
+        given = {override.key_or_group for override in parser.parse_overrides(arguments)}
+        cases = [self._read_case(i, parser, given) for i in range(len(self.cases))]
         values: dict[str, list[str]] = {}
         shortened: dict[str, str] = {}
         own = [quote_options(f"{key}={swept}") for key, swept in self.params.items()]
@@ -109,7 +122,29 @@ class Planner(Sweeper):
                 values[key] = [quote_options(f"{key}={value}") for value in each]
         for key, what in shortened.items():
             print(f"{key}: {what}")
-        return [list(job) for job in itertools.product(*values.values())]
+        return [[*job, *case] for job in itertools.product(*values.values()) for case in cases]
+
+    def _read_case(self, i: int, parser: OverridesParser, given: set[str]) -> list[str]:
+        """The overrides of a case, without those whose keys the command line gives."""
+        swept = {word.lstrip("+~") for word in self.params}
+        found: dict[str, str] = {}
+        for word in self.cases[i]:
+            where = f"hydra.sweeper.cases[{i}]: {word}"
+            try:
+                override = parser.parse_override(quote_options(word))
+            except HydraException:
+                raise ConfigError(f"{where} cannot be read as key=value") from None
+            name = override.key_or_group
+            if override.is_sweep_override():
+                raise ConfigError(f"{where} has several values; write a case for each of them")
+            if name in _NOT_SWEPT:
+                raise ConfigError(f"{where}: {_NOT_SWEPT[name]}")
+            if name in found:
+                raise ConfigError(f"{where} is the second value of {name} in this case; keep one")
+            if name in swept:
+                raise ConfigError(f"{where}: params sweep {name} too; leave it to one of them")
+            found[name] = quote_options(word)
+        return [word for name, word in found.items() if name not in given]
 
     def _plan(self, jobs: Sequence[Sequence[str]]) -> tuple[list[Planned], StudySettings]:
         """Compose and check every point; of equal ones the first stays."""
@@ -137,6 +172,19 @@ class Planner(Sweeper):
             self._launcher.names = {planned.job: planned.name for planned in plan.values()}
             self._launcher.composed = trees  # composing costs 0.1 s a point
         return list(plan.values()), study
+
+
+def _read_cases(cases: object) -> list[list[str]]:
+    """The words of each case, as they were written."""
+    plain = OmegaConf.to_container(cases) if OmegaConf.is_config(cases) else cases
+    if not isinstance(plain, list):
+        raise ValueError(f"cases: {plain!r} is no list of lists of overrides")
+    for i, case in enumerate(plain):
+        if not (isinstance(case, list) and all(isinstance(word, str) for word in case)):
+            raise ValueError(
+                f"cases[{i}]: {case!r} is no list of overrides, such as [dt=0.5, seed=1]"
+            )
+    return plain
 
 
 def quote_options(argument: str) -> str:

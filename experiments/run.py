@@ -79,7 +79,7 @@ def register_plugins() -> None:
     # Hydra 1.3 accepts plugins of the package `hydra_plugins` only; 1.4 has no such rule.
     Plugins.is_in_toplevel_plugins_module = staticmethod(lambda target: True)  # type: ignore[assignment, method-assign]
     for group, name, plugin, settings in (
-        ("hydra/sweeper", "planner", Planner, {"params": None, "ends": False}),
+        ("hydra/sweeper", "planner", Planner, {"params": None, "cases": None, "ends": False}),
         (
             "hydra/launcher",
             "pool",
@@ -97,7 +97,7 @@ def register_plugins() -> None:
 def _run_once(config: DictConfig) -> None:
     """The single point, outside Hydra's own handling of errors."""
     try:
-        if HydraConfig.get().sweeper.get("params"):
+        if any(HydraConfig.get().sweeper.get(key) for key in ("params", "cases")):
             raise ConfigError("experiment: this one describes a sweep; add -m to run it")
         run_once(config)
     except ConfigError as error:

@@ -69,7 +69,7 @@ def test_smoke_scale_touches_no_axis_and_no_system() -> None:
     scale = OmegaConf.load(CONF / "scale" / "smoke.yaml")
     for experiment in (CONF / "experiment").glob("*.yaml"):
         swept = composed(f"experiment={experiment.stem}").hydra.sweeper.params
-        for key in swept:
+        for key in swept or ():
             assert OmegaConf.select(scale, str(key)) is None
     hydra = scale.pop("hydra")
     assert set(scale) <= SMALLER
@@ -84,8 +84,9 @@ def test_every_experiment_runs_small_and_is_drawn(experiment: str, tmp_path: Pat
         [sys.executable, str(script), *words], capture_output=True, text=True, timeout=300
     )
     assert done.returncode == 0, done.stderr
-    axes = composed(experiment).hydra.sweeper.params
-    points = 1
+    sweeper = composed(experiment).hydra.sweeper
+    axes = sweeper.params or {}
+    points = len(sweeper.cases or [[]])
     for override in OverridesParser.create().parse_overrides([f"{k}={v}" for k, v in axes.items()]):
         key, values = override.key_or_group, [str(each) for each in override.sweep_iterator()]
         points *= min(len(values), 2)

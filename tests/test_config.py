@@ -124,6 +124,7 @@ def test_every_setting_changes_identity() -> None:
     assert len({Point(other, Path()).identity for other in [settings, *found]}) == len(found) + 1
 
 
+CASES = "hydra.sweeper.cases="
 WRONG = [
     ("dtt=0.2", "dtt: unknown key; did you mean dt?"),
     ("+dtt=0.2", "dtt: unknown key; did you mean dt?"),
@@ -260,6 +261,22 @@ def test_all_wrong_points_of_a_sweep_are_reported_at_once(
         (["-m", "study=a,b"], "study=a,b: this changes no result"),
         (["-m", "dt=interval(0,1)"], "dt=interval(0,1): cannot be swept; list its values"),
         (["experiment=paper", "hydra.mode=RUN"], "experiment: this one describes a sweep; add -m"),
+        ([f"{CASES}[[]]"], "experiment: this one describes a sweep; add -m"),
+        (["-m", f"{CASES}3"], "hydra.sweeper: cases: 3 is no list of lists of overrides"),
+        (["-m", f"{CASES}[[],seed]"], "hydra.sweeper: cases[1]: 'seed' is no list of overrides, s"),
+        (["-m", f"{CASES}[[3]]"], "hydra.sweeper: cases[0]: [3] is no list of overrides, such as"),
+        (["-m", f"{CASES}[[],[seed]]"], "sweeper.cases[1]: seed cannot be read as key=value"),
+        (["-m", f"{CASES}[['seed=1,2']]"], "cases[0]: seed=1,2 has several values; write a case"),
+        (["-m", f"{CASES}[['study=x']]"], "cases[0]: study=x: this changes no result, so give"),
+        (["-m", f"{CASES}[['seed=1','seed=2']]"], "cases[0]: seed=2 is the second value of seed"),
+        (
+            ["-m", "experiment=paper", f"{CASES}[[],['dt=0.5']]"],
+            "hydra.sweeper.cases[1]: dt=0.5: params sweep dt too; leave it to one of them",
+        ),
+        (
+            ["-m", "dt=0.5,1.0", f"{CASES}[[],['sed=1']]"],
+            "sed: unknown key; did you mean seed? [2 of 4 points, such as dt=0.5 sed=1]",
+        ),
     ],
 )
 def test_sweep_that_cannot_be_is_refused(

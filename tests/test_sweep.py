@@ -234,6 +234,47 @@ def test_dry_run_shows_states_and_writes_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def listed(folder: Path, *arguments: str) -> list[str]:
+    """The names of the points that a sweep would run."""
+    status, out, err = run(folder, "-m", "sweep.dry_run=true", *arguments)
+    assert status == 0, err
+    return [line.partition("  ")[2] for line in out.splitlines() if line.startswith("run ")]
+
+
+def test_each_case_joins_each_combination(tmp_path: Path) -> None:
+    cases = "hydra.sweeper.cases=[[],['temperature=2'],['safety.width=0.1','seed=3']]"
+    ends = ["", " temperature=2", " safety.width=0.1 seed=3"]
+    assert listed(tmp_path, cases) == ["defaults", *(end.strip() for end in ends[1:])]
+    swept = [f"dt={dt}{end}" for dt in (0.5, 1.0) for end in ends]
+    assert listed(tmp_path, "dt=0.5,1.0", cases) == swept
+    # The command line wins, over one key of a case as over a swept one.
+    names = [f"seed={seed}{end.removesuffix(' seed=3')}" for seed in (4, 5) for end in ends]
+    assert listed(tmp_path, cases, "seed=4,5") == names
+
+
+def test_cases_of_an_experiment_stay_whole_at_smoke_scale(tmp_path: Path) -> None:
+    (tmp_path / "experiment").mkdir()
+    (tmp_path / "experiment" / "mine.yaml").write_text(
+        """# @package _global_
+study: mine
+hydra:
+  mode: MULTIRUN
+  sweeper:
+    params:
+      temperature: 1,2,3
+    cases:
+      - []
+      - [seed=1]
+      - [grid=100, "tasks.lower=[null,-0.5]"]
+"""
+    )
+    words = ["experiment=mine", f"--config-dir={tmp_path}"]
+    cases = ["", " seed=1", " grid=100 tasks.lower=[null,-0.5]"]
+    for scale, values in (([], (1, 2, 3)), (["scale=smoke"], (1, 3))):
+        found = listed(tmp_path, *scale, *words)
+        assert found == [f"temperature={value}{case}" for value in values for case in cases]
+
+
 def test_forced_point_runs_again(tmp_path: Path) -> None:
     assert run(tmp_path, "-m", "study=s")[0] == 0
     before = tables(tmp_path, "s")
