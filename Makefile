@@ -2,7 +2,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: help paper smoke test stress lint benchmark lock
+.PHONY: help paper figures smoke test stress lint benchmark lock
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -10,6 +10,9 @@ help: ## list the targets
 paper: $(READY) ## run the paper's whole sweep, write its tables and draw them
 	$(BIN)/python experiments/run.py -m experiment=paper
 	$(BIN)/python -m paper_figures paper
+
+figures: $(READY) ## draw all figures again, from the tables alone
+	$(BIN)/python -m paper_figures
 
 smoke: $(READY) ## run and draw every experiment, tiny, in seconds
 	@set -e; for each in $(basename $(notdir $(wildcard conf/experiment/*.yaml))); do \

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import pandas as pd
 
+from experiments.examples import example_tables
 from experiments.measures import TRUTH_TABLES
 from experiments.schema import plain
 from experiments.settings import Settings
@@ -101,6 +102,10 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
             file = written.enter_context(replacing(folder / "tables" / name))
             first = [(group[0], records[group[0].identity]["files"].get(name)) for group in groups]
             digests[name] = _join(file, name, first, extra, flat)
+        for name, frame in example_tables(ordered).items():
+            data = csv_bytes(frame)
+            written.enter_context(replacing(folder / "tables" / f"{name}.csv")).write(data)
+            digests[f"{name}.csv"] = digest(data)
     git = [record["git"] for record in records.values()]
     started = [record["started"] for record in records.values()]
     collated = Collated(
@@ -112,7 +117,7 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
         tables=digests,
     )
     write_collated(folder, collated)
-    return [folder / "tables" / name for name in names]
+    return [folder / "tables" / name for name in sorted(digests)]
 
 
 def _read_record(point: Point) -> dict[str, Any]:

@@ -1,84 +1,115 @@
-"""Draw the figures of a study from its tables: python -m paper_figures [STUDY] (default: paper)."""
+"""Draw figures from tables: python -m paper_figures [STUDY ...] (default: every study there is)."""
 
 from __future__ import annotations
 
 import argparse
 import io
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import ModuleType
 
 import pandas as pd
-from matplotlib.figure import Figure
 
 from paper_figures import hypothesis_map, rank_curve
-from paper_figures.origin import table_digest, write_note
+from paper_figures.origin import figure_note, read_note, sentence, write_note
+from paper_figures.selection import Unsuited
 from paper_figures.style import save
 
-# What single figures show, where a study holds it; the nearest that it holds otherwise.
-CELLS, ACTIONS, DT = 400, 9, 0.25
-
-_MAP_TABLES = ("hypotheses", "paths", "dimensions")
-_CURVE_TABLES = ("rank_quantiles",)
+# Every figure there is. A module has
+#   TABLES        the tables that it needs, each with the columns that it needs of it;
+#   draw(**them)  the figure, and facts(**them), what its caption says, a fact a line; both may
+#                 raise Unsuited;
+#   EACH          a column, if there is to be one figure for each of its values.
+FIGURES: tuple[ModuleType, ...] = (hypothesis_map, rank_curve)
 
 
 def main() -> int:
     """Run the command line; returns the exit status."""
     parser = argparse.ArgumentParser(prog="paper_figures", description=__doc__)
-    parser.add_argument("study", nargs="?", default="paper", metavar="STUDY")
+    parser.add_argument("study", nargs="*", metavar="STUDY")
     parser.add_argument("--results", type=Path, help="folder of results", metavar="DIR")
     chosen = parser.parse_args()
-    for path in draw_study((chosen.results or _default_results()) / chosen.study):
-        print(f"drawn: {path}")
+    results = chosen.results or _default_results()
+    studies = chosen.study or sorted(path.parent.name for path in results.glob("*/tables"))
+    if not studies:
+        raise SystemExit(f"no study in {results}: run one first, python experiments/run.py -m ...")
+    for study in studies:
+        try:
+            for path in draw_study(results / study):
+                print(f"drawn: {path}")
+        except Unsuited as reason:
+            if chosen.study:
+                raise SystemExit(str(reason)) from None
+            print(f"nothing to draw: {reason}")
     return 0
 
 
 def draw_study(study: Path) -> list[Path]:
-    """Draw every figure of a study into its folder `figures`; returns their paths.
+    """Draw every figure that a study's tables allow into its folder `figures`.
+
+    Returns:
+        The PNG of each; a PDF and the caption's facts as text are beside it.
 
     Raises:
-        SystemExit: a table is missing.
+        Unsuited: they allow none.
     """
-    needed = sorted({*_MAP_TABLES, *_CURVE_TABLES})
-    paths = {name: study / "tables" / f"{name}.csv" for name in needed}
-    missing = [name for name, path in paths.items() if not path.is_file()]
-    if missing:
-        raise SystemExit(
-            f"{study / 'tables'} has no table {', '.join(missing)}: run the study first, "
-            f"python experiments/run.py -m experiment={study.name}"
-        )
-    contents = {name: path.read_bytes() for name, path in paths.items()}
+    needed = {name for module in FIGURES for name in module.TABLES}
+    paths = {name: study / "tables" / f"{name}.csv" for name in sorted(needed)}
+    contents = {name: path.read_bytes() for name, path in paths.items() if path.is_file()}
     tables = {name: pd.read_csv(io.BytesIO(data)) for name, data in contents.items()}
-    drawn, origins = [], {}
-    for name, figure, used in _figures(tables):
-        drawn.append(save(figure, study / "figures" / name))
-        origins[name] = {f"{table}.csv": table_digest(contents[table]) for table in used}
-    write_note(study, origins)
+    before, notes, reasons, drawn = read_note(study), {}, [], []
+    source = sentence(study)
+    for module in FIGURES:
+        name = module.__name__.rpartition(".")[2]
+        try:
+            for suffix, chosen in _versions(module, tables):
+                path = study / "figures" / f"{name}{suffix}"
+                facts = module.facts(**chosen)
+                drawn.append(save(module.draw(**chosen), path, source))
+                lines = [facts.rstrip("\n"), "", f"Source: {source}."]
+                path.with_name(path.name + ".txt").write_text("\n".join(lines) + "\n")
+                used = {f"{table}.csv": contents[table] for table in chosen}
+                notes[path.name] = figure_note(path, name, used)
+        except Unsuited as reason:
+            reasons.append(f"{name}: {reason}")
+            # What cannot be drawn again stays listed, and `status` tells what is wrong with it.
+            kept = {figure: note for figure, note in before.items() if note["module"] == name}
+            notes |= kept
+            if kept:
+                print(f"{study.name}: not drawn again: {reasons[-1]}")
+    if not drawn:
+        raise Unsuited(
+            f"the tables in {study / 'tables'} make no figure ({'; '.join(reasons)}); run the "
+            f"study first, python experiments/run.py -m experiment={study.name}"
+        )
+    write_note(study, notes)
     return drawn
 
 
-def _figures(tables: dict[str, pd.DataFrame]) -> Iterator[tuple[str, Figure, tuple[str, ...]]]:
-    """Each figure with its name and the tables that it shows."""
-    chosen = _nearest(
-        _nearest(_nearest(tables["hypotheses"], "cells", CELLS), "dt", DT), "actions", ACTIONS
-    )
-    for truth, hypotheses in chosen.groupby("truth", sort=True):
-        settings = hypotheses.iloc[0]
-        figure = hypothesis_map.draw(
-            hypotheses,
-            tables["paths"][tables["paths"]["truth"] == truth],
-            tables["dimensions"][tables["dimensions"]["truth"] == truth],
-            f"truth {truth.upper()}, {settings['cells']} cells, {settings['actions']} "
-            f"actions, $\\Delta t$ = {settings['dt']:g} s",
+def _versions(
+    module: ModuleType, tables: Mapping[str, pd.DataFrame]
+) -> Iterator[tuple[str, dict[str, pd.DataFrame]]]:
+    """The tables that a figure is drawn from, or each of its figures, whose names have a suffix."""
+    for name, columns in module.TABLES.items():
+        if name not in tables:
+            raise Unsuited(f"there is no table {name}")
+        if missing := [column for column in columns if column not in tables[name]]:
+            raise Unsuited(f"table {name} has no column {', '.join(missing)}")
+    chosen = {name: tables[name] for name in module.TABLES}
+    each = getattr(module, "EACH", None)
+    if each is None:
+        yield "", chosen
+        return
+    first = next(iter(chosen.values()))
+    for value in sorted(first[each].unique()):
+        yield (
+            f"_{value}",
+            {
+                name: table[table[each] == value] if each in table else table
+                for name, table in chosen.items()
+            },
         )
-        yield f"hypotheses_{truth}", figure, _MAP_TABLES
-    quantiles = _nearest(tables["rank_quantiles"], "actions", ACTIONS)
-    yield "rank_of_the_truth", rank_curve.draw(quantiles), _CURVE_TABLES
-
-
-def _nearest(table: pd.DataFrame, column: str, value: float) -> pd.DataFrame:
-    """The rows whose `column` is nearest to a value."""
-    return table[(table[column] - value).abs() == (table[column] - value).abs().min()]
 
 
 def _default_results() -> Path:

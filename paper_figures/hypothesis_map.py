@@ -1,4 +1,4 @@
-"""The constraint hypotheses coloured by likelihood gain, the demonstrations drawn over them."""
+"""The hypotheses of one point coloured by likelihood gain, the demonstrations drawn over them."""
 
 from __future__ import annotations
 
@@ -9,32 +9,37 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 
-from paper_figures.style import COLUMN, RC, TRUTH, new_figure
+from paper_figures.plane import Plane, outline
+from paper_figures.selection import described
+from paper_figures.style import COLUMN, EDGE, PATH, RC, TRUTH, VIOLATED, new_figure
 
+TABLES = {
+    "example_ranking": ("truth", "cells", "actions", "dt", "hypothesis", "gain", "rank"),
+    "example_paths": ("truth", "demonstration"),
+    "dimensions": ("truth", "name", "unit", "lower", "upper", "periodic"),
+}
+EACH = "truth"
 TOP = 5
 
 
 def draw(
-    hypotheses: pd.DataFrame, paths: pd.DataFrame, dimensions: pd.DataFrame, title: str = ""
+    example_ranking: pd.DataFrame, example_paths: pd.DataFrame, dimensions: pd.DataFrame
 ) -> Figure:
     """Draw one ranking.
 
     Args:
-        hypotheses: one row a hypothesis: rank, gain [nat], feasible, and lower_<d>, upper_<d> of
-            each dimension d; optionally `covered_by_truth`.
-        paths: the demonstrations: demonstration, and a column for each dimension.
+        example_ranking: one row a hypothesis: rank, gain [nat], feasible, and lower_<d>, upper_<d>
+            of each dimension d; optionally `covered_by_truth`, and what the point was.
+        example_paths: the demonstrations: demonstration, and a column for each dimension.
         dimensions: name, unit, lower, upper and periodic of each dimension of the state. The
             first two that hypotheses bound are drawn, or, where they bound one, that and another.
-        title: above the axes.
     """
-    free = [not np.isfinite(hypotheses[f"lower_{name}"]).any() for name in dimensions["name"]]
-    order = np.argsort(free, kind="stable")[:2]
-    x, y = (dimensions.iloc[place] for place in sorted(order))
+    hypotheses, plane = example_ranking, Plane.of(example_ranking, dimensions)
     figure, axes = new_figure(COLUMN, 3.1)
     with plt.rc_context(RC):
-        boxes = _rectangles(hypotheses, x, y)
+        boxes = plane.rectangles(hypotheses)
         feasible = hypotheses["feasible"].to_numpy(dtype=bool)
         gain = hypotheses["gain"].to_numpy(dtype=float)
         finite = gain[feasible & np.isfinite(gain)]
@@ -42,7 +47,7 @@ def draw(
         cells = PatchCollection(
             [box for box, keep in zip(boxes, feasible, strict=True) if keep],
             cmap="YlGnBu",
-            edgecolor="#b0b0b0",
+            edgecolor=EDGE,
             linewidth=0.3,
         )
         # Gains spread over decades: the square root keeps the small ones apart from none.
@@ -52,15 +57,15 @@ def draw(
         axes.add_collection(
             PatchCollection(
                 [box for box, keep in zip(boxes, feasible, strict=True) if not keep],
-                facecolor="#f1f1f1",
-                edgecolor="#b0b0b0",
+                facecolor=VIOLATED,
+                edgecolor=EDGE,
                 linewidth=0.3,
             )
         )
-        _draw_paths(axes, paths, x, y)
+        _draw_paths(axes, example_paths, plane)
         for row, box in zip(hypotheses.itertuples(), boxes, strict=True):
             if row.feasible and row.rank <= TOP and row.gain > 0:
-                axes.add_patch(_outline(box, "black", 1.0))
+                axes.add_patch(outline(box, "black", 1.0))
                 middle = (box.get_x() + box.get_width() / 2, box.get_y() + box.get_height() / 2)
                 axes.text(
                     *middle,
@@ -73,12 +78,10 @@ def draw(
                     zorder=5,
                 )
             if getattr(row, "covered_by_truth", False):
-                axes.add_patch(_outline(box, TRUTH, 2.0))
-        axes.set_xlim(x["lower"], x["upper"])
-        axes.set_ylim(y["lower"], y["upper"])
-        axes.set_xlabel(f"{x['name'].replace('_', ' ')} [{x['unit']}]")
-        axes.set_ylabel(f"{y['name'].replace('_', ' ')} [{y['unit']}]")
-        axes.set_title(title)
+                axes.add_patch(outline(box, TRUTH, 2.0))
+        plane.dress(axes)
+        if "truth" in hypotheses:
+            axes.set_title(described(hypotheses, r"$\Delta t$"))
         bar = figure.colorbar(cells, ax=axes, shrink=0.85, pad=0.02)
         ticks = top * np.array([0, 1 / 16, 1 / 4, 9 / 16, 1])
         bar.set_ticks(np.sqrt(ticks).tolist(), labels=[f"{tick:.2g}" for tick in ticks])
@@ -88,55 +91,43 @@ def draw(
     return figure
 
 
-def _rectangles(hypotheses: pd.DataFrame, x: pd.Series, y: pd.Series) -> list[Rectangle]:
-    """Each hypothesis in the plane of x and y; a free side spans the axis."""
-    corners = [
-        hypotheses[[f"{side}_{x['name']}", f"{side}_{y['name']}"]].to_numpy(dtype=float)
-        for side in ("lower", "upper")
+def facts(
+    example_ranking: pd.DataFrame, example_paths: pd.DataFrame, dimensions: pd.DataFrame
+) -> str:
+    """What the caption says."""
+    best = example_ranking.sort_values("rank", kind="stable")
+    ruled_out = int(np.sum(~best["feasible"].astype(bool)))
+    lines = [
+        "Hypotheses ranked by the likelihood gain of forbidding them.",
+        f"Point {best['point'].iloc[0]}: {described(best)}.",
+        f"Demonstrations: {example_paths['demonstration'].nunique()}.",
+        f"Hypotheses: {len(best)}, of which some demonstration violates {ruled_out}.",
+        *(
+            f"Rank {row.rank:g}: hypothesis {row.hypothesis}, gain {row.gain:.3g} nat, "
+            f"posterior {row.posterior:.3g}{', inside the truth' * bool(row.covered_by_truth)}."
+            for row in best.head(TOP).itertuples()
+        ),
+        "Uncertainty: none is drawn; this is one ranking of one set of demonstrations.",
     ]
-    lower, upper = (
-        np.where(np.isfinite(corner), corner, [x[side], y[side]])
-        for corner, side in zip(corners, ("lower", "upper"), strict=True)
-    )
-    return [Rectangle(tuple(a), *(b - a)) for a, b in zip(lower, upper, strict=True)]
+    return "\n".join(lines)
 
 
-def _outline(box: Rectangle, colour: str, width: float) -> Rectangle:
-    """The border of a box."""
-    return Rectangle(
-        box.get_xy(),
-        box.get_width(),
-        box.get_height(),
-        fill=False,
-        edgecolor=colour,
-        linewidth=width,
-        zorder=4,
-    )
-
-
-def _draw_paths(axes: Axes, paths: pd.DataFrame, x: pd.Series, y: pd.Series) -> None:
+def _draw_paths(axes: Axes, paths: pd.DataFrame, plane: Plane) -> None:
     """Each path as a thin line, broken where a periodic dimension wraps; starts and ends marked."""
     for _, path in paths.groupby("demonstration", sort=True):
-        points = path[[x["name"], y["name"]]].to_numpy(dtype=float).copy()
-        for column, dimension in enumerate((x, y)):
-            if dimension["periodic"]:
-                period = dimension["upper"] - dimension["lower"]
-                wrapped = dimension["lower"] + (points[:, column] - dimension["lower"]) % period
-                points[:, column] = wrapped
-                jump = np.abs(np.diff(wrapped)) > period / 2
-                points = np.insert(points, np.flatnonzero(jump) + 1, np.nan, axis=0)
-        axes.plot(*points.T, color="#444444", linewidth=0.5, alpha=0.6, zorder=3)
-        axes.plot(*points[0], "o", color="#444444", markersize=2, zorder=3)
-        axes.plot(*points[-1], "s", color="#444444", markersize=2.2, zorder=3)
+        points = plane.line(path)
+        axes.plot(*points.T, color=PATH, linewidth=0.5, alpha=0.6, zorder=3)
+        axes.plot(*points[0], "o", color=PATH, markersize=2, zorder=3)
+        axes.plot(*points[-1], "s", color=PATH, markersize=2.2, zorder=3)
 
 
 def _legend(figure: Figure, with_truth: bool) -> None:
     """What the signs mean, below the axes."""
     entries: list[object] = [
-        Line2D([], [], color="#444444", linewidth=0.7, label="demonstration"),
-        Line2D([], [], color="#444444", marker="o", markersize=3, linestyle="", label="start"),
-        Line2D([], [], color="#444444", marker="s", markersize=3, linestyle="", label="end"),
-        Patch(facecolor="#f1f1f1", edgecolor="#b0b0b0", linewidth=0.5, label="violated"),
+        Line2D([], [], color=PATH, linewidth=0.7, label="demonstration"),
+        Line2D([], [], color=PATH, marker="o", markersize=3, linestyle="", label="start"),
+        Line2D([], [], color=PATH, marker="s", markersize=3, linestyle="", label="end"),
+        Patch(facecolor=VIOLATED, edgecolor=EDGE, linewidth=0.5, label="violated"),
         Patch(facecolor="white", edgecolor="black", linewidth=1.0, label=f"top {TOP}, by rank"),
     ]
     if with_truth:

@@ -1,9 +1,10 @@
 """What figures were drawn from: `figures/figures.json`, beside them.
 
-{"drawn_by": hash of this package's source,
- "study": null, or of the study's points and data: {"points": hash of their identities,
-          "sources": {...}, "commits": [...], "dirty": ..., "started": [first, last]},
- "figures": {name: {table: sha256, ...}, ...}}
+{"study": null, or of the study's points and data: {"points": hash of their identities,
+          "count": how many, "sources": {...}, "commits": [...], "dirty": ...,
+          "started": [first, last]},
+ "figures": {name: {"module": what draws it, "drawn_by": hash of its source,
+                    "tables": {file: sha256, ...}, "files": {file: sha256, ...}}, ...}}
 """
 
 from __future__ import annotations
@@ -16,11 +17,15 @@ from pathlib import Path
 from typing import Any
 
 NOTE = "figures.json"
+SUFFIXES = (".png", ".pdf", ".txt")
+# The modules that figures share; the others of this package draw one figure each.
+SHARED = ("plane", "selection", "style")
 
 
-def drawing_source() -> str:
-    """Hash of the source that draws."""
-    parts = sorted(Path(__file__).parent.glob("*.py"))
+def drawing_source(module: str) -> str:
+    """Hash of the source that draws a figure: its own module and the shared ones."""
+    here = Path(__file__).parent
+    parts = [here / f"{name}.py" for name in (module, *SHARED)]
     return _sha256(b"".join(path.name.encode() + b"\0" + path.read_bytes() for path in parts))
 
 
@@ -29,9 +34,24 @@ def data_origin(study: Path) -> dict[str, Any] | None:
     try:
         collated = json.loads((study / "study.json").read_bytes())["collated"]
         origin = {key: collated[key] for key in ("sources", "commits", "dirty", "started")}
-        return {"points": _sha256("\n".join(collated["points"]).encode()), **origin}
+        points = collated["points"]
+        return {"points": _sha256("\n".join(points).encode()), "count": len(points), **origin}
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def sentence(study: Path) -> str:
+    """The origin of a study's data in words: points, commit, date."""
+    origin = data_origin(study)
+    if origin is None:
+        return f"study {study.name}, whose points are not listed"
+    commits = ", ".join(commit[:12] for commit in origin["commits"]) or "unknown"
+    changed = ", with changes" if origin["dirty"] else ""
+    points = f"{origin['count']} point{'s' * (origin['count'] > 1)}"
+    return (
+        f"study {study.name}, {points} (digest {origin['points'][:12]}), "
+        f"git commit {commits}{changed}, data of {origin['started'][1]}"
+    )
 
 
 def table_digest(data: bytes) -> str:
@@ -39,9 +59,38 @@ def table_digest(data: bytes) -> str:
     return _sha256(data)
 
 
-def write_note(study: Path, figures: Mapping[str, Mapping[str, str]]) -> None:
-    """List the figures of a study, each with the digests of the tables that it was drawn from."""
-    note = {"drawn_by": drawing_source(), "study": data_origin(study), "figures": figures}
+def figure_note(path: Path, module: str, tables: Mapping[str, bytes]) -> dict[str, Any]:
+    """What is listed of a figure that was just written.
+
+    Args:
+        path: its files, without their suffix.
+        module: the name of the module that drew it.
+        tables: the content of the tables that it was drawn from, by file name.
+    """
+    files = [path.with_name(path.name + suffix) for suffix in SUFFIXES]
+    return {
+        "module": module,
+        "drawn_by": drawing_source(module),
+        "tables": {name: _sha256(data) for name, data in tables.items()},
+        "files": {file.name: _sha256(file.read_bytes()) for file in files},
+    }
+
+
+def read_note(study: Path) -> dict[str, dict[str, Any]]:
+    """What is listed of each figure of a study; nothing if there is no such list."""
+    try:
+        figures = json.loads((study / "figures" / NOTE).read_bytes())["figures"]
+        return {
+            name: {key: note[key] for key in ("module", "drawn_by", "tables", "files")}
+            for name, note in figures.items()
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+
+
+def write_note(study: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
+    """List the figures of a study, each by its `figure_note`."""
+    note = {"study": data_origin(study), "figures": dict(sorted(figures.items()))}
     path = study / "figures" / NOTE
     part = path.with_name(f".{NOTE}-{os.getpid()}.part")
     part.write_text(json.dumps(note, indent=1) + "\n")
@@ -50,27 +99,32 @@ def write_note(study: Path, figures: Mapping[str, Mapping[str, str]]) -> None:
 
 def concerns(study: Path) -> dict[str, list[str]]:
     """Why each figure that was drawn is not up to date, by its name; nothing for one that is."""
-    try:
-        note = json.loads((study / "figures" / NOTE).read_bytes())
-        figures: dict[str, dict[str, str]] = note["figures"]
-        drawn_by = note["drawn_by"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
     found: dict[str, list[str]] = {}
-    for name, tables in sorted(figures.items()):
+    for name, note in sorted(read_note(study).items()):
         reasons = found[name] = []
-        for suffix in (".png", ".pdf"):
-            if not (study / "figures" / f"{name}{suffix}").exists():
-                reasons.append(f"{name}{suffix} is missing")
-        for table, digest in tables.items():
+        for file, digest in note["files"].items():
+            path = study / "figures" / file
+            if not path.exists():
+                reasons.append(f"{file} is missing")
+            elif _sha256(path.read_bytes()) != digest:
+                reasons.append(f"{file} was changed after it was drawn")
+        for table, digest in note["tables"].items():
             path = study / "tables" / table
             if not path.exists():
                 reasons.append(f"table {table} is missing")
             elif table_digest(path.read_bytes()) != digest:
                 reasons.append(f"table {table} has changed since")
-        if drawn_by != drawing_source():
+        if note["drawn_by"] != _current_source(note["module"]):
             reasons.append("the code that draws has changed since")
     return found
+
+
+def _current_source(module: str) -> str | None:
+    """Hash of the source that draws a figure now; None if its module is gone."""
+    try:
+        return drawing_source(module)
+    except OSError:
+        return None
 
 
 def _sha256(data: bytes) -> str:

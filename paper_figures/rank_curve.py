@@ -1,60 +1,123 @@
-"""Rank of the true constraint against the number of demonstrations (compare the paper's Fig. 5)."""
+"""Rank of the truth against the number of demonstrations (the paper's Fig. 5)."""
 
 from __future__ import annotations
 
+import re
+
 import matplotlib.pyplot as plt
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from paper_figures.style import COLUMN, RC, mark, new_figure
+from paper_figures.selection import paper_rows
+from paper_figures.style import GUIDE, PAGE, RC, mark, new_figure
+
+TABLES = {
+    "rank_curve": (
+        *("truth", "cells", "actions", "dt", "samples", "demonstrations"),
+        *("median", "q25", "q75", "median_low", "median_high"),
+    )
+}
+PAPER = 9  # demonstrations after which the paper finds the truth among the first
 
 _TICKS = (1, 2, 5, 10, 20, 50, 100)
+_KEYS = ("truth", "cells", "dt", "demonstrations")
 
 
-def draw(rank_quantiles: pd.DataFrame) -> Figure:
-    """Draw medians with bands from the first to the third quartile, a panel a dt and truth.
+def draw(rank_curve: pd.DataFrame) -> Figure:
+    """Draw a row of panels a dt and, a truth, the rank and the share among the first.
 
     Args:
-        rank_quantiles: the table of that name: truth, cells, actions, dt, demonstrations, q25,
-            median, q75; of one number of actions.
+        rank_curve: the table of that name: a row a number of demonstrations and setting.
     """
-    truths = sorted(rank_quantiles["truth"].unique())
-    dts = sorted(rank_quantiles["dt"].unique())
-    actions = rank_quantiles["actions"].iloc[0]
+    curves, top = paper_rows(rank_curve, _KEYS), _top(rank_curve)
+    truths, dts = sorted(curves["truth"].unique()), sorted(curves["dt"].unique())
     figure, grid = new_figure(
-        COLUMN * max(1, len(truths)),
-        0.5 + 1.5 * len(dts),
+        PAGE * max(1, len(truths)) / 2,
+        0.6 + 1.15 * len(dts),
         nrows=len(dts),
-        ncols=len(truths),
+        ncols=2 * len(truths),
         sharex=True,
-        sharey=True,
+        sharey="col",
         squeeze=False,
     )
     with plt.rc_context(RC):
         for row, dt in enumerate(dts):
             for column, truth in enumerate(truths):
-                axes = grid[row][column]
-                panel = rank_quantiles[
-                    (rank_quantiles["dt"] == dt) & (rank_quantiles["truth"] == truth)
-                ]
+                panel = curves[(curves["dt"] == dt) & (curves["truth"] == truth)]
+                left, right = grid[row][2 * column : 2 * column + 2]
                 for number, (cells, curve) in enumerate(panel.groupby("cells", sort=True)):
-                    curve = curve.sort_values("demonstrations")
-                    x, style = curve["demonstrations"], mark(int(cells), number)
-                    band = (curve["q25"], curve["q75"])
-                    axes.fill_between(x, *band, color=style["color"], alpha=0.15, linewidth=0)
-                    axes.plot(x, curve["median"], label=f"{cells} cells", markevery=4, **style)
-                axes.axhspan(0.9, 5, color="#000000", alpha=0.05, linewidth=0, label="top 5")
-                axes.axvline(9, color="#888888", linewidth=0.6, linestyle=":")
-                axes.set_yscale("log")
-                axes.set_ylim(0.9, 100)
-                axes.set_yticks(_TICKS, labels=[str(tick) for tick in _TICKS])
-                axes.yaxis.set_minor_locator(NullLocator())
-                axes.set_xticks(range(1, int(panel["demonstrations"].max()) + 1, 4))
-                axes.set_title(f"truth {truth.upper()}, $\\Delta t$ = {dt:g} s, {actions} actions")
-                if row == len(dts) - 1:
-                    axes.set_xlabel("demonstrations")
-                if column == 0:
-                    axes.set_ylabel("rank of the truth")
-        figure.legend(*grid[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+                    _draw_rank(left, curve, mark(int(cells), number))
+                    _draw_share(right, curve, top, mark(int(cells), number))
+                left.axhspan(0.9, top, color="#000000", alpha=0.05, linewidth=0)
+                left.set_yscale("log")
+                left.set_ylim(0.9, 100)
+                left.set_yticks(_TICKS, labels=[str(tick) for tick in _TICKS])
+                left.yaxis.set_minor_locator(NullLocator())
+                right.set_ylim(-3, 103)
+                for axes in (left, right):
+                    axes.axvline(PAPER, color=GUIDE, linewidth=0.6, linestyle=":")
+                    axes.set_xticks(range(1, int(curves["demonstrations"].max()) + 1, 4))
+                left.set_title(f"{truth.upper()}, $\\Delta t$ = {dt:g} s", loc="left")
+                left.set_ylabel("rank of truth")
+                right.set_ylabel(f"in top {top} [%]")
+        for axes in grid[-1]:
+            axes.set_xlabel("demonstrations")
+        figure.legend(*_entries(grid[0][0]), loc="outside lower center", ncols=5)
     return figure
+
+
+def facts(rank_curve: pd.DataFrame) -> str:
+    """What the caption says."""
+    curves, top = paper_rows(rank_curve, _KEYS), _top(rank_curve)
+    share = f"share_top_{top}"
+    at = min(PAPER, int(curves["demonstrations"].max()))
+    lines = [
+        f"Rank of the true constraint among all hypotheses, {curves['actions'].iloc[0]} actions.",
+        "Curves: median over random subsets of the demonstrations and over seeds.",
+        "Bands: first to third quartile, the spread between subsets.",
+        f"Beside them: share of the subsets that rank the truth among the first {top}.",
+        "Uncertainty: the share's bars, and the intervals below, are 95 % two-level bootstrap "
+        "intervals (seeds, then subsets).",
+        f"Grey: rank 1 to {top}; dotted: {PAPER} demonstrations.",
+        f"After {at} demonstrations:",
+    ]
+    for row in curves[curves["demonstrations"] == at].itertuples():
+        part, low, high = (100 * getattr(row, share + end) for end in ("", "_low", "_high"))
+        lines.append(
+            f"  {row.truth.upper()}, {row.cells} cells, dt {row.dt:g} s: median rank "
+            f"{row.median:g} ({row.median_low:g} to {row.median_high:g}), "
+            f"in the top {top} {part:.0f} % ({low:.0f} to {high:.0f})"
+        )
+    return "\n".join(lines)
+
+
+def _top(rank_curve: pd.DataFrame) -> int:
+    """Among how many first hypotheses the table counts the truth."""
+    (top,) = (
+        int(found[1]) for name in rank_curve if (found := re.fullmatch(r"share_top_(\d+)", name))
+    )
+    return top
+
+
+def _draw_rank(axes: Axes, curve: pd.DataFrame, style: dict[str, str]) -> None:
+    """Median and quartiles."""
+    x = curve["demonstrations"]
+    axes.fill_between(x, curve["q25"], curve["q75"], color=style["color"], alpha=0.15, linewidth=0)
+    label = f"{curve['cells'].iloc[0]} cells"
+    axes.plot(x, curve["median"], label=label, markevery=4, **style)
+
+
+def _draw_share(axes: Axes, curve: pd.DataFrame, top: int, style: dict[str, str]) -> None:
+    """Share among the first, in percent, with its interval."""
+    middle, low, high = (100 * curve[f"share_top_{top}{end}"] for end in ("", "_low", "_high"))
+    x = curve["demonstrations"]
+    axes.fill_between(x, low, high, color=style["color"], alpha=0.15, linewidth=0)
+    axes.plot(x, middle, markevery=4, **style)
+
+
+def _entries(axes: Axes) -> tuple[list[object], list[str]]:
+    """Signs and labels of the curves."""
+    handles, labels = axes.get_legend_handles_labels()
+    return handles, labels

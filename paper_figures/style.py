@@ -13,6 +13,8 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 COLUMN = 3.4  # width of a column [in]
+DPI = 200  # of PNGs
+PAGE = 7.0  # of two columns and what is between them [in]
 
 # The paper's colours by number of cells (pink, green, yellow, blue), their hues from the palette of
 # Okabe and Ito, which is safe for the colour-blind; its marks beside them, legible in grey.
@@ -20,7 +22,11 @@ CELL_MARKS = {100: "o", 400: "x", 900: "s", 1600: "^"}
 CELL_COLOURS = {100: "#cc79a7", 400: "#009e73", 900: "#d9a400", 1600: "#0072b2"}
 OTHER_MARKS = ("D", "v", "P", "*")
 OTHER_COLOURS = ("#000000", "#d55e00", "#56b4e9", "#7f7f7f")
-TRUTH = "#d62828"
+TRUTH = "#d55e00"
+PATH = "#444444"  # of demonstrations among many
+EDGE = "#b0b0b0"  # between hypotheses
+VIOLATED = "#f1f1f1"  # hypotheses that some demonstration violates
+GUIDE = "#888888"  # lines that help the eye
 
 RC = {
     "font.size": 8,
@@ -54,11 +60,24 @@ def mark(cells: int, rank: int) -> dict[str, Any]:
     }
 
 
-def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG and PDF beside each other; the same bytes for the same figure."""
+def save(figure: Figure, path: Path, source: str = "") -> Path:
+    """Write a figure as PNG and PDF beside each other; the same bytes for the same figure.
+
+    Args:
+        figure: what was drawn; it is closed.
+        path: of the files, without their suffix.
+        source: where the data come from, for the files' metadata.
+
+    Returns:
+        The PNG.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
+    png, pdf = (path.with_name(path.name + suffix) for suffix in (".png", ".pdf"))
     with plt.rc_context(RC):
-        figure.savefig(path.with_suffix(".png"), dpi=200, metadata={"Software": None})
-        figure.savefig(path.with_suffix(".pdf"), metadata={"CreationDate": None})
+        # No time and no version of a program: both change bytes that show the same.
+        metadata = {"Title": path.name, "Source": source, "Software": None}
+        figure.savefig(png, dpi=DPI, metadata=metadata)
+        metadata = {"Title": path.name, "Subject": source, "CreationDate": None}
+        figure.savefig(pdf, metadata=metadata)
     plt.close(figure)
-    return path.with_suffix(".png")
+    return png

@@ -1,0 +1,89 @@
+"""The plane of two state dimensions in which boxes, cells and paths are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
+_TURN_TICKS = {0.0: "0", 0.25: r"$\pi/2$", 0.5: r"$\pi$", 0.75: r"$3\pi/2$", 1.0: r"$2\pi$"}
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Two dimensions of the state, each a row of the table `dimensions`.
+
+    Attributes:
+        x: name, unit, lower, upper and periodic of the horizontal one.
+        y: of the vertical one.
+    """
+
+    x: pd.Series
+    y: pd.Series
+
+    @classmethod
+    def of(cls, boxes: pd.DataFrame, dimensions: pd.DataFrame) -> Plane:
+        """The first two dimensions that boxes bound, or, where they bound one, that and another."""
+        free = [not np.isfinite(boxes[f"lower_{name}"]).any() for name in dimensions["name"]]
+        order = np.argsort(free, kind="stable")[:2]
+        return cls(*(dimensions.iloc[place] for place in sorted(order)))
+
+    def rectangles(self, boxes: pd.DataFrame) -> list[Rectangle]:
+        """Each box, of columns lower_<d> and upper_<d>; a free side spans the axis."""
+        corners = [
+            boxes[[f"{side}_{self.x['name']}", f"{side}_{self.y['name']}"]].to_numpy(dtype=float)
+            for side in ("lower", "upper")
+        ]
+        lower, upper = (
+            np.where(np.isfinite(corner), corner, [self.x[side], self.y[side]])
+            for corner, side in zip(corners, ("lower", "upper"), strict=True)
+        )
+        return [Rectangle(tuple(a), *(b - a)) for a, b in zip(lower, upper, strict=True)]
+
+    def line(self, path: pd.DataFrame) -> np.ndarray:
+        """(K, 2) the points of a path, with a row of NaN wherever a periodic dimension wraps."""
+        points = path[[self.x["name"], self.y["name"]]].to_numpy(dtype=float).copy()
+        for column, dimension in enumerate((self.x, self.y)):
+            if dimension["periodic"]:
+                period = dimension["upper"] - dimension["lower"]
+                wrapped = dimension["lower"] + (points[:, column] - dimension["lower"]) % period
+                points[:, column] = wrapped
+                jump = np.abs(np.diff(wrapped)) > period / 2
+                points = np.insert(points, np.flatnonzero(jump) + 1, np.nan, axis=0)
+        return points
+
+    def dress(self, axes: Axes) -> None:
+        """Set limits and labels with units; a whole turn in radians has ticks by its quarters."""
+        axes.set_xlim(self.x["lower"], self.x["upper"])
+        axes.set_ylim(self.y["lower"], self.y["upper"])
+        axes.set_xlabel(axis_label(self.x))
+        axes.set_ylabel(axis_label(self.y))
+        for dimension, axis in ((self.x, axes.xaxis), (self.y, axes.yaxis)):
+            turn = dimension["upper"] - dimension["lower"]
+            if (
+                dimension["unit"] == "rad"
+                and dimension["lower"] == 0
+                and np.isclose(turn, 2 * np.pi)
+            ):
+                axis.set_ticks([turn * share for share in _TURN_TICKS], list(_TURN_TICKS.values()))
+
+
+def axis_label(dimension: pd.Series) -> str:
+    """The name of a dimension with its unit."""
+    return f"{dimension['name'].replace('_', ' ')} [{dimension['unit']}]"
+
+
+def outline(box: Rectangle, colour: str, width: float, **options: object) -> Rectangle:
+    """The border of a box, above what fills it."""
+    return Rectangle(
+        box.get_xy(),
+        box.get_width(),
+        box.get_height(),
+        fill=False,
+        edgecolor=colour,
+        linewidth=width,
+        **{"zorder": 4, **options},
+    )
