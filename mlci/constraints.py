@@ -16,7 +16,7 @@ from scipy import sparse
 from mlci.grids import Grid
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 
-_CHORDS_AT_ONCE = 1 << 15  # bounds the memory of one crossing test to a few C x 32 KiB
+_CHORDS_AT_ONCE = 1 << 13  # C x 8 KiB of a crossing test stay in the second level of cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,39 +146,54 @@ class ConstraintSet:
         Returns:
             (owners, C) sparse boolean matrix.
         """
-        keys = [np.empty(0, dtype=np.int64)]
+        entered = np.zeros(owners * len(self), dtype=bool)
         for first in range(0, len(starts), _CHORDS_AT_ONCE):
             part = slice(first, first + _CHORDS_AT_ONCE)
             chord, region = self._chord_hits(self.space.wrap(starts[part]), steps[part])
-            keys.append(np.unique(owner[part][chord] * len(self) + region))
-        rows, columns = np.divmod(np.unique(np.concatenate(keys)), len(self))
-        ones = np.ones(len(rows), dtype=bool)
-        return sparse.csr_matrix((ones, (rows, columns)), shape=(owners, len(self)))
+            entered[owner[part][chord] * len(self) + region] = True
+        rows, columns = np.divmod(np.flatnonzero(entered), len(self))
+        ends = np.append(0, np.cumsum(np.bincount(rows, minlength=owners)))
+        return sparse.csr_matrix(
+            (np.ones(len(rows), dtype=bool), columns, ends), shape=(owners, len(self))
+        )
 
     def _chord_hits(self, starts: Floats, steps: Floats) -> tuple[Ints, Ints]:
         """Pairs (chord, region) that meet; starts wrapped."""
         region, lower, upper = self._images
         low, high = np.minimum(starts, starts + steps), np.maximum(starts, starts + steps)
         near = np.ones((len(region), len(starts)), dtype=bool)
-        for d in range(self.space.dimension):
-            # Few distinct sides make many boxes: test each side once, then spread the answer.
-            sides, which = np.unique(
-                np.stack([lower[:, d], upper[:, d]], axis=1), axis=0, return_inverse=True
-            )
-            overlap = (low[:, d] < sides[:, 1, None]) & (high[:, d] > sides[:, 0, None])
-            near &= overlap[which.ravel()]
-        image, chord = np.nonzero(near)
+        for d, first, last, which in self._sides:
+            near &= ((low[:, d] < last[:, None]) & (high[:, d] > first[:, None]))[which]
+        image, chord = np.divmod(np.flatnonzero(near), len(starts))
         # Slabs: the chord is between the two sides of dimension d at times from enter to leave.
-        lower, upper, start, step = lower[image], upper[image], starts[chord], steps[chord]
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            to_lower, to_upper = (lower - start) / step, (upper - start) / step
         # A near chord is between the two sides at some time in (0, 1) in each dimension, and at
         # all times where it stands still: it hits if it is between all of them at once.
-        still = step == 0
-        enter = np.where(still, -np.inf, np.minimum(to_lower, to_upper)).max(axis=1)
-        leave = np.where(still, np.inf, np.maximum(to_lower, to_upper)).min(axis=1)
+        enter, leave = np.full(len(chord), -np.inf), np.full(len(chord), np.inf)
+        for d, *_ in self._sides:
+            start, step = starts[chord, d], steps[chord, d]
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                to_lower = (lower[image, d] - start) / step
+                to_upper = (upper[image, d] - start) / step
+            still = step == 0
+            np.maximum(enter, np.where(still, -np.inf, np.minimum(to_lower, to_upper)), out=enter)
+            np.minimum(leave, np.where(still, np.inf, np.maximum(to_lower, to_upper)), out=leave)
         hit = enter < leave
         return chord[hit], region[image[hit]]
+
+    @cached_property
+    def _sides(self) -> list[tuple[int, Floats, Floats, Ints]]:
+        """The distinct sides in each dimension that some region bounds, and whose they are.
+
+        Few distinct sides make many boxes: a chord is compared with each side once. Returns the
+        dimension, the sides' first and last ends, and (I,) the side of each of the `_images`.
+        """
+        _, lower, upper = self._images
+        found = []
+        for d in np.flatnonzero(np.any(np.isfinite(lower), axis=0)):
+            ends = np.stack([lower[:, d], upper[:, d]], axis=1)
+            sides, which = np.unique(ends, axis=0, return_inverse=True)
+            found.append((int(d), sides[:, 0], sides[:, 1], which.ravel()))
+        return found
 
     @cached_property
     def _images(self) -> tuple[Ints, Floats, Floats]:

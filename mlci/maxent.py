@@ -8,14 +8,18 @@ be reached from the start in t moves, and so wherever no probability ever is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from mlci.mdp import TabularMDP
+from mlci.mdp import Progress, TabularMDP
 from mlci.spaces import Bools, Floats, Ints
+
+_CELLS_AT_ONCE = 1 << 12  # whose moves a step of work holds
+_PHI_BYTES = 1 << 29  # of violation probabilities held at once, else regions go block by block
 
 
 def reachable(mdp: TabularMDP, start: int, steps: int) -> list[Ints]:
@@ -51,12 +55,12 @@ def log_partition(mdp: TabularMDP, start: int, goals: ArrayLike, steps: int) -> 
     ends = np.intersect1d(cells[steps], np.atleast_1d(goals))
     log_z[steps, ends] = 0.0
     for t in reversed(range(steps)):
-        here = cells[t]
-        value = _action_values(mdp, log_z[t + 1], here)
-        best = np.max(value, axis=1)
-        finite = best > -np.inf
-        spread = np.sum(np.exp(value[finite] - best[finite, None]), axis=1)
-        log_z[t, here[finite]] = best[finite] + np.log(spread)
+        for here in _parts(cells[t]):
+            value = _action_values(mdp, log_z[t + 1], here)
+            best = np.max(value, axis=1)
+            finite = best > -np.inf
+            spread = np.sum(np.exp(value[finite] - best[finite, None]), axis=1)
+            log_z[t, here[finite]] = best[finite] + np.log(spread)
     return log_z
 
 
@@ -68,8 +72,7 @@ def policy(mdp: TabularMDP, log_z: Floats, t: int) -> tuple[Ints, Floats]:
         whose rows sum to 1.
     """
     cells = np.flatnonzero(log_z[t] > -np.inf)
-    chances = np.exp(_action_values(mdp, log_z[t + 1], cells) - log_z[t, cells, None])
-    return cells, chances / np.sum(chances, axis=1, keepdims=True)
+    return cells, _chances(mdp, log_z, t, cells)
 
 
 def violation_probabilities(mdp: TabularMDP, log_z: Floats, start: int) -> Floats:
@@ -85,31 +88,56 @@ def violation_probabilities(mdp: TabularMDP, log_z: Floats, start: int) -> Float
     """
     if log_z[0, start] == -np.inf:
         raise ValueError(f"no trajectory from cell {start} reaches a goal: Phi is not defined")
-    steps, regions = len(log_z) - 1, mdp.crosses.shape[1]
-    pair_cell, pair_region, pair_crossed = mdp.crossing_pairs
+    regions = mdp.crosses.shape[1]
+    support = int(np.max(np.sum(log_z > -np.inf, axis=1)))
+    blocks = min(regions, -(-regions * 2 * 8 * support // _PHI_BYTES))
+    edges = np.linspace(0, regions, max(1, blocks) + 1).astype(int)
+    phi = np.empty(regions)
+    for first, last in pairwise(edges):
+        phi[first:last] = _block_of_phi(mdp, log_z, first, last)
+    return np.minimum(phi, 1.0)
+
+
+def _block_of_phi(mdp: TabularMDP, log_z: Floats, first: int, last: int) -> Floats:
+    """Phi of the regions from `first` to before `last`, of the one cell that log_z starts in."""
+    begins, pair_region, pair_crossed = mdp.crossing_pairs
+    steps = len(log_z) - 1
     row_of = np.zeros(mdp.states, dtype=np.int64)
     cells_after = np.flatnonzero(log_z[steps] > -np.inf)
-    phi = np.zeros((len(cells_after), regions))
+    phi = np.zeros((len(cells_after), last - first))
     for t in reversed(range(steps)):
         row_of[:] = -1
         row_of[cells_after] = np.arange(len(cells_after))
-        cells, chances = policy(mdp, log_z, t)
-        phi_after, phi = phi, _merged(mdp, cells, chances, row_of, len(cells_after)) @ phi
-        row_now = np.full(mdp.states, -1, dtype=np.int64)
-        row_now[cells] = np.arange(len(cells))
-        pairs = np.flatnonzero(row_now[pair_cell] >= 0)
-        if len(pairs):
-            row, region = row_now[pair_cell[pairs]], pair_region[pairs]
-            # A successor outside the support has probability 0: whichever row stands for it.
-            after = phi_after[row_of[mdp.successor[pair_cell[pairs]]], region[:, None]]
-            entered = np.where(pair_crossed[pairs], 1.0, after)
-            phi[row, region] = np.einsum("pm,pm->p", chances[row], entered)
+        cells = np.flatnonzero(log_z[t] > -np.inf)
+        phi_after, phi = phi, np.empty((len(cells), last - first))
+        row = 0
+        for here in _parts(cells):
+            chances = _chances(mdp, log_z, t, here)
+            now = _merged(mdp, here, chances, row_of, len(cells_after)) @ phi_after
+            counts = begins[here + 1] - begins[here]
+            owner = np.repeat(np.arange(len(here)), counts)
+            begin = begins[here] - np.cumsum(counts) + counts
+            pair = np.arange(len(owner)) + np.repeat(begin, counts)
+            region = pair_region[pair] - first
+            wanted = (region >= 0) & (region < last - first)
+            owner, pair, region = owner[wanted], pair[wanted], region[wanted]
+            if len(pair):
+                # A successor outside the support has probability 0: whichever row stands for it.
+                after = phi_after[row_of[mdp.successor[here[owner]]], region[:, None]]
+                entered = np.where(pair_crossed[pair], 1.0, after)
+                now[owner, region] = np.einsum("pm,pm->p", chances[owner], entered)
+            phi[row : row + len(here)] = now
+            row += len(here)
         cells_after = cells
-    return np.asarray(np.minimum(phi[0], 1.0))
+    return phi[0]
 
 
 def expected_violations(
-    mdp: TabularMDP, starts: Sequence[int], goals: Sequence[ArrayLike], steps: Sequence[int]
+    mdp: TabularMDP,
+    starts: Sequence[int],
+    goals: Sequence[ArrayLike],
+    steps: Sequence[int],
+    progress: Progress | None = None,
 ) -> tuple[Floats, Bools]:
     """Phi of several tasks.
 
@@ -118,6 +146,7 @@ def expected_violations(
         starts: N start cells.
         goals: N goals, each a cell or several.
         steps: N numbers of transitions.
+        progress: is told how many tasks are done, and of how many.
 
     Returns:
         (N, C) violation probabilities, 0 where the goal cannot be reached; and (N,) whether it can.
@@ -129,6 +158,8 @@ def expected_violations(
         reached[j] = log_z[0, start] > -np.inf
         if reached[j]:
             phi[j] = violation_probabilities(mdp, log_z, start)
+        if progress is not None:
+            progress(j + 1, len(starts))
     return phi, reached
 
 
@@ -155,6 +186,18 @@ def sample_moves(
         moves.append(np.argmax(cumulative > draws, axis=1))
         cells.append(mdp.successor[cells[-1], moves[-1]])
     return np.stack(cells, axis=1), np.stack(moves, axis=1)
+
+
+def _parts(cells: Ints) -> Iterator[Ints]:
+    """Cells in parts whose moves fit into memory and cache."""
+    for first in range(0, len(cells), _CELLS_AT_ONCE):
+        yield cells[first : first + _CELLS_AT_ONCE]
+
+
+def _chances(mdp: TabularMDP, log_z: Floats, t: int, cells: Ints) -> Floats:
+    """(Q, M) probabilities of the moves of cells that carry probability at step t."""
+    chances = np.exp(_action_values(mdp, log_z[t + 1], cells) - log_z[t, cells, None])
+    return np.asarray(chances / np.sum(chances, axis=1, keepdims=True))
 
 
 def _action_values(mdp: TabularMDP, log_z_after: Floats, cells: Ints) -> Floats:

@@ -18,7 +18,7 @@ move = action * k^n + start point. In the centre model a move is an action.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,7 +33,10 @@ from mlci.spaces import Bools, Floats, Ints
 from mlci.systems import System
 
 _CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the curve it stands for
-_MOVES_AT_ONCE = 1 << 17
+_MOVES_AT_ONCE = 1 << 17  # what a step of long work holds beside its result: about 100 MB
+
+# Is told how many parts of long work are done, and of how many.
+Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,26 +90,49 @@ class TabularMDP:
         """Each cell's moves sorted by successor, so that those with the same one can be merged.
 
         Returns (S, M) each: the moves in that order, their successors, and where a new
-        successor begins.
+        successor begins; in the smallest whole numbers that hold them.
         """
-        order = np.argsort(self.successor, axis=1, kind="stable")
-        successor = np.take_along_axis(self.successor, order, axis=1)
-        begins = np.ones(successor.shape, dtype=bool)
-        begins[:, 1:] = successor[:, 1:] != successor[:, :-1]
-        return order, np.maximum(successor, 0), begins
+        shape = self.successor.shape
+        order = np.empty(shape, dtype=np.min_scalar_type(self.moves))
+        successor = np.empty(shape, dtype=np.int32 if self.states < 1 << 31 else np.int64)
+        begins = np.ones(shape, dtype=bool)
+        for block in self.blocks():
+            order[block] = np.argsort(self.successor[block], axis=1, kind="stable")
+            ordered = np.take_along_axis(self.successor[block], order[block], axis=1)
+            begins[block, 1:] = ordered[:, 1:] != ordered[:, :-1]
+            successor[block] = np.maximum(ordered, 0)
+        return order, successor, begins
 
     @cached_property
     def crossing_pairs(self) -> tuple[Ints, Ints, Bools]:
         """The P pairs of a cell and a region that at least one of the cell's moves crosses.
 
-        Returns the pairs' cells (P,) ascending, their regions (P,), and which moves cross (P, M).
+        Returns, with the pairs in order of cell and then region: (S+1,) where each cell's pairs
+        begin, so that those of cell s are begins[s] to begins[s+1]; the pairs' regions (P,); and
+        which moves cross (P, M).
         """
-        row, region = self.crosses.nonzero()
-        state, move = np.divmod(row.astype(np.int64), self.moves)
-        pair, which = np.unique(state * self.crosses.shape[1] + region, return_inverse=True)
-        crossed = np.zeros((len(pair), self.moves), dtype=bool)
-        crossed[which, move] = True
-        return (*np.divmod(pair, self.crosses.shape[1]), crossed)
+        regions, ends = self.crosses.shape[1], self.crosses.indptr
+        begins, region, crossed = np.zeros(self.states + 1, dtype=np.int64), [], []
+        for block in self.blocks():
+            first, last = block.start * self.moves, block.stop * self.moves
+            entries = np.diff(ends[first : last + 1])
+            row = np.repeat(np.arange(last - first), entries)
+            state, move = np.divmod(row, self.moves)
+            column = self.crosses.indices[ends[first] : ends[last]]
+            pair, which = np.unique(state * regions + column, return_inverse=True)
+            part = np.zeros((len(pair), self.moves), dtype=bool)
+            part[which, move] = True
+            count = np.bincount(pair // regions, minlength=block.stop - block.start)
+            begins[block.start + 1 : block.stop + 1] = count
+            region.append((pair % regions).astype(np.int32))
+            crossed.append(part)
+        return np.cumsum(begins), np.concatenate(region), np.concatenate(crossed)
+
+    def blocks(self) -> Iterator[slice]:
+        """Consecutive slices of the cells, of so many moves as one step of work should hold."""
+        size = max(1, _MOVES_AT_ONCE // self.moves)
+        for first in range(0, self.states, size):
+            yield slice(first, min(first + size, self.states))
 
 
 def action_grid(system: System, counts: int | Sequence[int]) -> Floats:
@@ -139,6 +165,7 @@ def discretize(
     regions: ConstraintSet,
     samples: int = 1,
     temperature: float = 1.0,
+    progress: Progress | None = None,
 ) -> TabularMDP:
     """Form the tabular MDP of a continuous system, equation (1) and section IV-C.
 
@@ -154,28 +181,33 @@ def discretize(
         samples: k; the moves of an action start at k^n points of the cell. 1 is the centre model,
             more the cell-averaged one (see the module's head).
         temperature: divides the reward (2).
+        progress: is told how many cells are done, and of how many.
     """
     actions = np.asarray(actions, dtype=float)
-    starts = grid.points_inside(samples)
-    points = starts.shape[1]
-    moves = len(actions) * points
     substeps = substep_count(system, grid, actions, dt)
+    points = samples ** len(grid.shape)
+    shape = grid.size, len(actions) * points
     applied = np.repeat(actions, points, axis=0)  # (M, m) the control of each move
-    parts = []
-    block = max(1, _MOVES_AT_ONCE // (moves * substeps))
-    for first in range(0, grid.size, block):
-        inside = starts[first : first + block]
+    successor, reward = np.empty(shape, dtype=np.int64), np.empty(shape)
+    crosses = []
+    size = max(1, _MOVES_AT_ONCE // (shape[1] * substeps))
+    for first in range(0, grid.size, size):
+        block = slice(first, min(first + size, grid.size))
+        inside = grid.points_inside(samples, block)
         origin = np.tile(inside, (1, len(actions), 1)).reshape(-1, inside.shape[-1])
         control = np.tile(applied, (len(inside), 1))
         path = rollout(system, origin, control[:, None, :], dt, substeps)
+        reached, crossed = _follow(grid, regions, path)
+        crosses.append(crossed)
+        successor[block] = reached.reshape(-1, shape[1])
         rewards = system.running_reward(origin, control) * (dt / temperature)
-        parts.append((*_follow(grid, regions, path), rewards))
-    successor, crosses, reward = zip(*parts, strict=True)
-    cells = np.concatenate(successor).reshape(grid.size, moves)
+        reward[block] = rewards.reshape(-1, shape[1])
+        if progress is not None:
+            progress(block.stop, grid.size)
     return TabularMDP(
-        successor=cells,
-        reward=np.concatenate(reward).reshape(grid.size, moves),
-        allowed=cells >= 0,
+        successor=successor,
+        reward=reward,
+        allowed=successor >= 0,
         crosses=sparse.vstack(crosses, format="csr"),
         action=np.repeat(np.arange(len(actions)), points),
     )
@@ -190,7 +222,12 @@ def forbid(mdp: TabularMDP, regions: ArrayLike) -> TabularMDP:
     """
     columns = np.atleast_1d(np.asarray(regions, dtype=np.int64))
     crossed = np.asarray(mdp.crosses[:, columns].sum(axis=1)).reshape(mdp.successor.shape) > 0
-    return replace(mdp, allowed=mdp.allowed & ~crossed)
+    forbidden = replace(mdp, allowed=mdp.allowed & ~crossed)
+    # Neither depends on which moves are allowed, so what has been computed is kept.
+    for name in ("by_successor", "crossing_pairs"):
+        if name in vars(mdp):
+            vars(forbidden)[name] = getattr(mdp, name)
+    return forbidden
 
 
 def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int:
@@ -200,17 +237,19 @@ def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int
     control; and no chord may span a quarter of a period, for the short way round to be its own.
     """
     shortest = dt
-    for action in actions:
-        speed = system.dynamics(grid.centers, action[None, :])
-        by_state, _ = system.jacobians(grid.centers, action[None, :])
-        bend = np.max(np.abs(np.einsum("...ij,...j->...i", by_state, speed)), axis=0)
-        quarter = np.where(grid.space.periodic, grid.space.bounds.widths / 4, np.inf)
-        with np.errstate(divide="ignore"):
-            shortest = min(
-                shortest,
-                float(np.min(np.sqrt(8 * _CHORD_ERROR * grid.widths / bend))),
-                float(np.min(quarter / np.max(np.abs(speed), axis=0))),
-            )
+    quarter = np.where(grid.space.periodic, grid.space.bounds.widths / 4, np.inf)
+    for first in range(0, grid.size, _MOVES_AT_ONCE):
+        states = grid.centers[first : first + _MOVES_AT_ONCE]
+        for action in actions:
+            speed = system.dynamics(states, action[None, :])
+            by_state, _ = system.jacobians(states, action[None, :])
+            bend = np.max(np.abs(np.einsum("...ij,...j->...i", by_state, speed)), axis=0)
+            with np.errstate(divide="ignore"):
+                shortest = min(
+                    shortest,
+                    float(np.min(np.sqrt(8 * _CHORD_ERROR * grid.widths / bend))),
+                    float(np.min(quarter / np.max(np.abs(speed), axis=0))),
+                )
     return int(np.ceil(dt / shortest - 1e-9))
 
 

@@ -135,14 +135,20 @@ class Diagnosis:
 
 def diagnose(system: System, grid: Grid, actions: Floats, dt: float, mdp: TabularMDP) -> Diagnosis:
     """Measure how a discretisation moves; see `Diagnosis`."""
-    own = np.arange(grid.size)[:, None]
-    speed = np.abs(system.dynamics(grid.centers[:, None, :], actions[None, :, :]))
-    place = np.stack(np.unravel_index(np.maximum(mdp.successor, 0), grid.shape), axis=-1)
-    here = np.stack(np.unravel_index(own, grid.shape), axis=-1)
-    changes = np.any((place != here) & mdp.allowed[..., None], axis=1)
+    stays, crossed, changing = 0, 0.0, np.zeros(len(grid.shape))
+    for block in mdp.blocks():
+        own = np.arange(block.start, block.stop)[:, None]
+        speed = np.abs(system.dynamics(grid.centers[block, None, :], actions[None, :, :]))
+        crossed += float(np.sum(np.max(speed * dt / grid.widths, axis=-1)))
+        successor, allowed = mdp.successor[block], mdp.allowed[block]
+        stays += int(np.sum((successor == own) & allowed))
+        place = np.stack(np.unravel_index(np.maximum(successor, 0), grid.shape), axis=-1)
+        here = np.stack(np.unravel_index(own, grid.shape), axis=-1)
+        changing += np.sum(np.any((place != here) & allowed[..., None], axis=1), axis=0)
+    moves = int(np.sum(mdp.allowed))
     return Diagnosis(
-        stay=float(np.mean((mdp.successor == own)[mdp.allowed])),
-        leave=float(np.mean(~mdp.allowed)),
-        cells_crossed=float(np.mean(np.max(speed * dt / grid.widths, axis=-1))),
-        frozen=tuple(float(share) for share in np.mean(~changes, axis=0)),
+        stay=stays / moves if moves else np.nan,
+        leave=(mdp.allowed.size - moves) / mdp.allowed.size,
+        cells_crossed=crossed / (grid.size * len(actions)),
+        frozen=tuple(float(share) for share in (grid.size - changing) / grid.size),
     )

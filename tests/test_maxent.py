@@ -8,9 +8,19 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from mlci.maxent import log_partition, policy, reachable, sample_moves, violation_probabilities
-from mlci.mdp import TabularMDP, forbid
+from mlci.constraints import ConstraintSet
+from mlci.grids import Grid
+from mlci.maxent import (
+    expected_violations,
+    log_partition,
+    policy,
+    reachable,
+    sample_moves,
+    violation_probabilities,
+)
+from mlci.mdp import TabularMDP, action_grid, discretize, forbid
 from mlci.spaces import Floats
+from mlci.systems import Pendulum
 
 # Sums of at most 4^5 terms of order 1 in double precision: 1e-12 leaves three digits of room.
 TOLERANCE = 1e-12
@@ -96,6 +106,26 @@ def test_four_routes_to_violation_probabilities_agree(seed: int, goals: list[int
     np.testing.assert_allclose(by_partition, expected, rtol=0, atol=TOLERANCE)
 
 
+@pytest.mark.parametrize("samples", [1, 2])
+@pytest.mark.parametrize(("cells_at_once", "phi_bytes"), [(1, 1), (7, 1 << 15), (1 << 12, 1)])
+def test_blocks_of_any_size_give_the_same_bits(
+    monkeypatch: pytest.MonkeyPatch, samples: int, cells_at_once: int, phi_bytes: int
+) -> None:
+    """A cell and a region at a time, some of each, or all: no sum is taken in another order."""
+    system = Pendulum()
+    grid, actions = Grid(system.space, (11, 12)), action_grid(system, 5)
+    regions = ConstraintSet.from_grid(system.space, (5, 7))
+    mdp = discretize(system, grid, actions, 0.5, regions, samples)
+    whole = log_partition(mdp, 40, [90, 91], 10)
+    phi = violation_probabilities(mdp, whole, 40)
+    assert np.sum((phi > 0.01) & (phi < 0.99)) > 10
+    monkeypatch.setattr("mlci.maxent._CELLS_AT_ONCE", cells_at_once)
+    monkeypatch.setattr("mlci.maxent._PHI_BYTES", phi_bytes)
+    log_z = log_partition(mdp, 40, [90, 91], 10)
+    np.testing.assert_array_equal(log_z, whole)
+    np.testing.assert_array_equal(violation_probabilities(mdp, log_z, 40), phi)
+
+
 def test_the_toy_worlds_are_not_trivial() -> None:
     """The agreement above is worth something only if goals are reached and regions crossed."""
     shares = []
@@ -164,3 +194,19 @@ def test_sampled_trajectories_follow_the_distribution() -> None:
     assert np.all(np.abs(crossed.mean(axis=0) - phi) <= 4 * error + 1e-12)
     first = np.bincount(moves[:, 0], minlength=mdp.moves) / count
     np.testing.assert_allclose(first, policy(mdp, log_z, 0)[1][0], atol=4 * 0.5 / np.sqrt(count))
+
+
+def test_several_tasks_are_each_alone() -> None:
+    """One that cannot be done has zeros, and progress is told after each."""
+    mdp = toy_mdp(0)
+    told: list[tuple[int, int]] = []
+    goals = [[2], [5], [1, 3]]
+    phi, reached = expected_violations(
+        mdp, [0, 0, 1], goals, [5, 4, 3], progress=lambda *count: told.append(count)
+    )
+    assert told == [(1, 3), (2, 3), (3, 3)]
+    assert reached.tolist() == [True, False, True]
+    assert not phi[1].any()
+    for j, (start, steps) in {0: (0, 5), 2: (1, 3)}.items():
+        total, crossing = enumerate_trajectories(mdp, start, goals[j], steps)
+        np.testing.assert_allclose(phi[j], crossing / total, rtol=0, atol=TOLERANCE)

@@ -83,11 +83,13 @@ def test_diagnosis_tells_a_grid_that_cannot_change_speed(
     assert (diagnosis.frozen[1] > 0.9) == frozen
 
 
-def test_diagnosis_counts_what_moves_do() -> None:
+@pytest.mark.parametrize("at_once", [7, 1 << 17])
+def test_diagnosis_counts_what_moves_do(monkeypatch: pytest.MonkeyPatch, at_once: int) -> None:
     """Move by move, on a grid where many moves leave the bounds."""
     system = DoubleIntegrator()
     grid, actions = Grid(system.space, (5, 6)), action_grid(system, 3)
     mdp = discretize(system, grid, actions, 0.9, ConstraintSet.from_grid(system.space, (2, 2)))
+    monkeypatch.setattr("mlci.mdp._MOVES_AT_ONCE", at_once)
     diagnosis = diagnose(system, grid, actions, 0.9, mdp)
     stay, leave, changing = 0, 0, [set(), set()]
     for cell in range(grid.size):
