@@ -36,6 +36,7 @@ __all__ = [
     "maxent",
     "mdp",
     "metrics",
+    "online",
     "reachability",
     "recordings",
     "safety_filter",

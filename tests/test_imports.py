@@ -31,6 +31,7 @@ MAY_IMPORT = {
     "mdp": SETS | MOTION,
     "maxent": TABULAR,
     "inference": TABULAR,
+    "online": TABULAR | {"inference"},
     "metrics": TABULAR | {"inference"},
 }
 MATHEMATICS = {"numpy", "scipy", "pyarrow", "mlci"}

@@ -35,3 +35,12 @@ def test_every_command_of_the_readme_names_files_that_exist() -> None:
     targets = (root / "Makefile").read_text()
     for target in re.findall(r"^    make (\w+)", README, flags=re.MULTILINE):
         assert re.search(rf"^{target}:", targets, flags=re.MULTILINE), target
+
+
+def test_the_examples_run(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every block of Python, each in a module of its own."""
+    examples = re.findall(r"^```python\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+    assert examples
+    for example in examples:
+        exec(compile(example, "README.md", "exec"), {})
+    assert "Box(lower=" in capsys.readouterr().out
