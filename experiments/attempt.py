@@ -69,21 +69,23 @@ def run_apart(point: Point, *, force: bool = False, time_limit: float | None = N
         return State.RUNNING
 
 
-def bury(point: Point, error: Exception) -> dict[str, Any]:
+def bury(point: Point, error: Exception, after: int) -> dict[str, Any]:
     """Keep the failure of an attempt whose process ended without a word; returns it.
 
     Args:
         point: the point, which nobody runs.
         error: what its launcher knows of it.
+        after: the last attempt before this one, which perhaps did not get as far as to start.
     """
     with suppress(Timeout), point.lock.acquire(blocking=False):
         # Somebody else may have run it since.
-        if not point.is_done() and point.failure() is None:
-            words = _read_last_words(point)
+        if not point.is_done() and not _failed(point, after):
+            number = max(point.attempts(), after + 1)
+            words = _read_last_words(point) if point.attempts() > after else ""
             late = words.startswith("Timeout (")  # faulthandler's own word for it
             end = "still running at its time limit" if late else describe(error)
-            _keep_failure(point, "timeout" if late else "died", end, words)
-    if (failure := point.failure()) is not None:
+            _keep_failure(point, "timeout" if late else "died", end, words, number)
+    if failure := _failed(point, after):
         return failure
     # On a full disk the error that it raised is known to the launcher only.
     trace = getattr(error, "traceback", "")
@@ -94,16 +96,22 @@ def bury(point: Point, error: Exception) -> dict[str, Any]:
     }
 
 
+def _failed(point: Point, after: int) -> dict[str, Any] | None:
+    """How the last attempt failed, if it is a later one than `after`."""
+    failure = point.failure()
+    return failure if failure and int(failure.get("attempt", 1)) > after else None
+
+
 def _attempt(point: Point, log: Callable[[str], None] | None) -> None:
     """Compute the point, and keep its tables and record, or its failure.
 
     All output of the process goes to the point's log, unless `log` is to be told each line.
     """
-    notes = [point.note(name) or {} for name in ("attempt", "failure", "record")]
+    number = 1 + point.attempts()
     note = {
         "identity": point.identity,
         "source": point.source,
-        "attempt": 1 + max(int(note.get("attempt", 0)) for note in notes),
+        "attempt": number,
         "started": datetime.now(UTC).isoformat(timespec="milliseconds"),
         "host": socket.gethostname(),
         "pid": os.getpid(),
@@ -120,7 +128,7 @@ def _attempt(point: Point, log: Callable[[str], None] | None) -> None:
         tables = _compute(point, store, log)
         _keep_result(point, store, tables, note)
     except Exception as error:
-        _keep_failure(point, "raised", describe(error), traceback.format_exc())
+        _keep_failure(point, "raised", describe(error), traceback.format_exc(), number)
         raise
     (point.folder / "attempt.json").unlink()
 
@@ -174,15 +182,15 @@ def _keep_result(
     _write(point, "record", record)
 
 
-def _keep_failure(point: Point, reason: str, error: str, trace: str) -> None:
-    """Write how the attempt ended, as far as there is room on the disk."""
+def _keep_failure(point: Point, reason: str, error: str, trace: str, attempt: int) -> None:
+    """Write how an attempt, by its number, ended, as far as there is room on the disk."""
     note = point.note("attempt") or {}
-    started = note.get("started")
+    started = note.get("started") if note.get("attempt") == attempt else None
     spent = datetime.now(UTC) - datetime.fromisoformat(started) if started else None
     failure = {
         "identity": point.identity,
         "source": point.source,
-        "attempt": note.get("attempt", 1),
+        "attempt": attempt,
         "reason": reason,
         "error": error,
         "traceback": trace,

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
+if __name__ == "__main__":  # before all that takes time to import
+    from experiments import commands
+
+    sys.exit(commands.infer())
+
 import json
 import os
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -208,7 +214,3 @@ def _save(
     }
     replace_file(folder / "record.json", json.dumps(record, indent=1).encode() + b"\n")
     return folder
-
-
-if __name__ == "__main__":
-    sys.exit(main())

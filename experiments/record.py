@@ -86,10 +86,17 @@ class PointFolder(ABC):
         """How the last attempt failed, or None if it did not."""
         return self.note("failure")
 
-    def is_done(self) -> bool:
-        """Whether it finished, with the source as it is now."""
+    def is_done(self, after: int = 0) -> bool:
+        """Whether it finished, with the source as it is now, in a later attempt than `after`."""
         record = self.record()
-        return record is not None and record.get("source") == self.source
+        if record is None or record.get("source") != self.source:
+            return False
+        return int(record.get("attempt", 1)) > after
+
+    def attempts(self) -> int:
+        """Number of the last attempt, however it ended; 0 if there was none."""
+        notes = [self.note(name) or {} for name in ("attempt", "failure", "record")]
+        return max(int(note.get("attempt", 0)) for note in notes)
 
     def is_running(self) -> bool:
         """Whether a live process holds the lock."""

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+
+if __name__ == "__main__":  # before all that takes time to import
+    from experiments import commands
+
+    sys.exit(commands.results())
+
 import argparse
 import os
 import shutil
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -178,7 +184,3 @@ def _point(archive: Archive, name: str) -> KeptPoint:
 def _width() -> int | None:
     """Columns of the terminal; None where there is none."""
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
+if __name__ == "__main__":  # before all that takes time to import
+    from experiments import commands
+
+    sys.exit(commands.run())
+
 import os
 import signal
-import sys
 import traceback
 from functools import cache
 
@@ -106,7 +112,3 @@ def _run_once(config: DictConfig) -> None:
     except Exception:
         traceback.print_exc()
         raise SystemExit(FAILED) from None
-
-
-if __name__ == "__main__":
-    sys.exit(main())

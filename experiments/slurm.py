@@ -1,8 +1,6 @@
-"""A Hydra launcher that runs points as SLURM jobs, each of which can fail alone.
+"""A Hydra launcher that runs points as SLURM jobs.
 
-A job runs its share of the points in worker processes, as on one machine. What became of a point is
-read from what the point left, and whether a job has ended from `squeue`: a job's own account would
-be a pickle, and none is left of a job that was killed.
+Whether a job has ended is read from `squeue`, so that no accounting is needed.
 """
 
 from __future__ import annotations
@@ -10,22 +8,16 @@ from __future__ import annotations
 import getpass
 import shutil
 import subprocess
-import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from hydra.core.utils import JobReturn, JobStatus
-from hydra.types import HydraContext, TaskFunction
-from omegaconf import DictConfig
 from tqdm import tqdm
 
-from experiments.config import ConfigError, read_config
-from experiments.launcher import Job, PoolLauncher
-from experiments.record import Point, State
-from experiments.task import results_folder, run_task
+from experiments.cluster import ClusterLauncher, Share, run_share
+from experiments.config import ConfigError
 
 _PATIENCE = 3  # looks at the queue in which a job must be absent before it counts as ended
 _SUBMISSION = {  # what submitit calls our own options
@@ -36,74 +28,48 @@ _SUBMISSION = {  # what submitit calls our own options
 }
 
 
-class SlurmLauncher(PoolLauncher):
-    """Jobs of one SLURM array; results and code lie on a file system that all nodes share.
+class SlurmLauncher(ClusterLauncher):
+    """Jobs of one SLURM array.
 
     Attributes:
-        jobs: at most so many jobs; each takes an equal share of the points.
         poll: [s] between looks at the queue.
         resources: what a job asks for: `timeout_min`, `cpus_per_task`, `mem_gb`, `partition`,
             `array_parallelism` and the like; None is the cluster's own default.
     """
 
     def __init__(self, jobs: int, poll: float, fail_fast: bool, **resources: Any) -> None:
-        super().__init__(resources["cpus_per_task"], fail_fast)
-        self.jobs, self.poll = jobs, poll
+        super().__init__(jobs, resources["cpus_per_task"], fail_fast)
+        self.poll = poll
         self.resources = {
             _SUBMISSION.get(key, key): value
             for key, value in resources.items()
             if value is not None
         }
 
-    def setup(
-        self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
-    ) -> None:
-        """Look for what jobs need.
-
-        Raises:
-            ConfigError: submitit or SLURM is not installed, or an option makes no sense.
-        """
-        super().setup(hydra_context=hydra_context, task_function=task_function, config=config)
-        if self.fail_fast:
-            raise ConfigError("sweep.fail_fast: a cluster starts jobs by itself; leave it out")
+    def _look(self) -> None:
         if find_spec("submitit") is None:
             raise ConfigError("hydra/launcher: slurm needs pip install 'mlci[slurm]'")
         if shutil.which("sbatch") is None:
             raise ConfigError("hydra/launcher: slurm needs sbatch, which is not on this machine")
 
-    def launch(
-        self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
-    ) -> Sequence[JobReturn]:
-        """Run all points in jobs; those that were not finished are returned as failed.
-
-        Raises:
-            ConfigError: SLURM refuses such jobs.
-        """
-        trees = {tuple(job): self._tree(tuple(job)) for job in job_overrides}
-        points = {job: _point(tree) for job, tree in trees.items()}
-        results = next(iter(points.values())).results
-        (results / ".slurm").mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix="", dir=results / ".slurm"))
-        dealt = list(trees)
-        shares = [dealt[i :: self.jobs] for i in range(min(self.jobs, len(dealt)))]
-        ids = self._submit([{job: trees[job] for job in share} for share in shares], folder)
+    def _run(self, shares: Sequence[Share], folder: Path) -> list[str]:
+        ids = self._submit(shares, folder)
         try:
             self._wait(ids)
         finally:
             subprocess.run(["scancel", *{each.partition("_")[0] for each in ids}], check=False)
             for pickled in folder.glob("*.pkl"):
                 pickled.unlink()
-        where = {job: each for each, share in zip(ids, shares, strict=True) for job in share}
-        return [_returned(job, points[job], where[job], folder) for job in trees]
+        return [f"SLURM job {each}" for each in ids]
 
-    def _submit(self, shares: Sequence[Mapping[Job, Any]], folder: Path) -> list[str]:
+    def _submit(self, shares: Sequence[Share], folder: Path) -> list[str]:
         """Hand the shares to SLURM; returns each one's job id, such as 12_3."""
         import submitit  # an extra
 
         executor = submitit.AutoExecutor(folder, cluster="slurm")
         executor.update_parameters(name="mlci", **self.resources)
         try:
-            jobs = executor.map_array(_run_share, shares, [self.workers] * len(shares))
+            jobs = executor.map_array(run_share, shares, [self.workers] * len(shares))
         except submitit.core.utils.FailedJobError as error:
             raise ConfigError(f"hydra/launcher: SLURM refused the jobs: {error}") from None
         print(
@@ -128,33 +94,8 @@ class SlurmLauncher(PoolLauncher):
                 bar.refresh()
 
 
-def _run_share(share: Mapping[Job, dict[str, Any]], workers: int) -> None:
-    """In a SLURM job: run points in worker processes; each keeps its own result or failure."""
-    pool = PoolLauncher(workers, fail_fast=False)
-    pool.task, pool.composed = run_task, dict(share)
-    pool.launch(list(share), initial_job_idx=0)
-
-
-def _point(tree: Mapping[str, Any]) -> Point:
-    """The point of a resolved config."""
-    settings, study = read_config(tree)
-    return Point(settings, results_folder(study))
-
-
 def _queue() -> set[str] | None:
     """Ids of this user's jobs that wait or run; None if SLURM does not answer now."""
     command = ["squeue", "--noheader", "--array", "--format=%i", f"--user={getpass.getuser()}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     return set(done.stdout.split()) if done.returncode == 0 else None
-
-
-def _returned(job: Job, point: Point, job_id: str, folder: Path) -> JobReturn:
-    """What became of a point whose job has ended."""
-    returned = JobReturn(overrides=list(job))
-    state = point.state()
-    if state in (State.DONE, State.RUNNING):  # running in another sweep
-        returned.status, returned.return_value = JobStatus.COMPLETED, state
-    else:
-        message = f"SLURM job {job_id} ended without a result; its log is in {folder}"
-        returned.status, returned.return_value = JobStatus.FAILED, RuntimeError(message)
-    return returned

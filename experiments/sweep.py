@@ -74,7 +74,7 @@ def run_points(todo: Sequence[Planned], launch: Launch, options: SweepSettings) 
     Args:
         todo: the points.
         launch: runs `experiments.task.run_task` for each of some jobs.
-        options: `retries` and `fail_fast` count.
+        options: `force`, `retries` and `fail_fast` count.
     """
     elsewhere = [planned for planned in todo if planned.state is State.RUNNING]
     ready = [planned for planned in todo if planned.state is not State.RUNNING]
@@ -83,15 +83,17 @@ def run_points(todo: Sequence[Planned], launch: Launch, options: SweepSettings) 
     not_started: list[Planned] = []
     while ready or elsewhere:
         again = []
+        before = {planned: planned.point.attempts() for planned in ready}
         returns = launch([planned.job for planned in ready]) if ready else []
         for planned, returned in zip(ready, returns, strict=True):
             if returned.status is JobStatus.UNKNOWN:
                 not_started.append(planned)
             elif returned.status is JobStatus.FAILED:
-                if planned.point.is_done():  # its process was killed just after
+                # Its process may have been killed just after it was done.
+                if planned.point.is_done(before[planned] if options.force else 0):
                     continue
                 tries[planned] -= 1
-                failure = bury(planned.point, returned._return_value)
+                failure = bury(planned.point, returned._return_value, before[planned])
                 if tries[planned]:
                     again.append(planned)
                 else:

@@ -22,6 +22,9 @@ def run_once(config: DictConfig) -> None:
         ConfigError: the config cannot be run.
     """
     settings, study = read_config(plain_tree(config))
+    for option in ("only", "limit", "time_limit", "retries", "fail_fast", "mix_sources"):
+        if getattr(study.sweep, option):
+            raise ConfigError(f"sweep.{option}: only a sweep heeds it; add -m, or leave it out")
     point = Point(settings, results_folder(study))
     if study.sweep.dry_run:
         print(f"{point.state()}: {point.folder}")

@@ -183,6 +183,8 @@ WRONG = [
     ("truth.boxes=[{lower:[3,0],upper:[3.1,1]}]", "truth: c1 covers no hypothesis entirely"),
     ("hypotheses.shape=null", "hypotheses: no shape and no boxes"),
     ("study=../x", "study: '../x' cannot name a folder"),
+    ("sweep.time_limit=5", "sweep.time_limit: only a sweep heeds it; add -m, or leave it out"),
+    ("sweep.retries=1", "sweep.retries: only a sweep heeds it"),
     ("workers=0", "workers: 0 must be at least 1"),
     ("hydra.run.dirr=x", "hydra.run.dirr: unknown key; did you mean dir?"),
 ]

@@ -91,7 +91,7 @@ def test_point_runs_as_long_as_its_holder_lives(point: Point) -> None:
     while point.state() is State.RUNNING and time.monotonic() < deadline:
         time.sleep(0.01)
     assert point.state() is State.MISSING
-    assert attempt.bury(point, RuntimeError("killed"))["reason"] == "died"
+    assert attempt.bury(point, RuntimeError("killed"), 0)["reason"] == "died"
     assert point.state() is State.FAILED
 
 

@@ -1,18 +1,19 @@
 """The SLURM launcher, with stand-ins for the commands of SLURM; the real ones: tests/stress."""
 
+import json
 import os
 import sys
 from pathlib import Path
 
 import pytest
-from test_sweep import run, tables
+from test_sweep import faulty, run, tables
 
 SBATCH = """
 import os, re, subprocess, sys
 script = open(sys.argv[-1]).read()
 indices = re.search(r"--array=0-(\\d+)", script)
 with open(os.environ["FAKE_QUEUE"], "w") as queue:
-    for i in range(int(indices[1]) + 1):
+    for i in range(0 if "DEAD_NODES" in os.environ else int(indices[1]) + 1):
         own = {"SLURM_JOB_ID": f"{8 + i}", "SLURM_ARRAY_JOB_ID": "7", "SLURM_ARRAY_TASK_ID": f"{i}",
                "SLURM_PROCID": "0", "SLURM_LOCALID": "0", "SLURM_NODEID": "0", "SLURM_NTASKS": "1",
                "SLURM_JOB_NUM_NODES": "1", "SLURM_JOB_NODELIST": "here"}
@@ -92,6 +93,31 @@ def test_killed_job_fails_alone_and_is_resumed(cluster: list[str], tmp_path: Pat
     status, out, err = run(tmp_path, *sweep, f"results={tmp_path / 'local' / 'results'}")
     assert status == 0, out + err
     assert tables(tmp_path, "s") == tables(tmp_path / "local", "s")
+
+
+def test_job_that_dies_before_its_points_start_passes_for_nothing_earlier(
+    cluster: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=none,raise", "study=s"]
+    status, _, err = run(tmp_path, *sweep)
+    assert status == 1
+    assert "ArithmeticError" in err
+    done, failed = (
+        next((tmp_path / "results" / "points").glob(f"*/{name}.json"))
+        for name in ("record", "failure")
+    )
+    before = done.read_bytes()
+    monkeypatch.setenv("DEAD_NODES", "")
+    status, out, err = run(tmp_path, *sweep, *cluster, "sweep.force=true")
+    assert status == 1, out + err
+    assert "2 of 2 points failed" in err
+    assert err.count("ended without a result; its log is in") == 2
+    assert "ArithmeticError" not in err
+    failure = json.loads(failed.read_bytes())
+    assert (failure["attempt"], failure["reason"], failure["started"]) == (2, "died", None)
+    # The old result is whole, and is kept.
+    assert done.read_bytes() == before
+    assert not (done.parent / "failure.json").exists()
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ fi
 work=$(mktemp -d)
 stop() {
     status=$?
-    [ "$status" = 0 ] || tail -n 30 "$work"/*.log "$work"/results/.slurm/*/*.err 2> /dev/null || true
+    [ "$status" = 0 ] || tail -n 30 "$work"/*.log "$work"/results/.jobs/*/*.err 2> /dev/null || true
     scancel --user="$(id -un)" 2> /dev/null || true
     for daemon in slurmd slurmctld munged; do
         [ -s "$work/$daemon.pid" ] && kill "$(cat "$work/$daemon.pid")" 2> /dev/null

@@ -1,0 +1,51 @@
+"""The commands: what they do is imported late, so that Ctrl-C ends them quietly from the start."""
+
+from __future__ import annotations
+
+import os
+import signal
+from importlib import import_module
+from typing import Any
+
+STOPPED = 130
+
+
+def run() -> int:
+    """`mlci-run`: experiments/run.py."""
+    return _start("experiments.run")
+
+
+def infer() -> int:
+    """`mlci-infer`: experiments/infer.py."""
+    return _start("experiments.infer")
+
+
+def results() -> int:
+    """`mlci-results`: experiments/results.py."""
+    return _start("experiments.results")
+
+
+def figures() -> int:
+    """`mlci-figures`: paper_figures."""
+    return _start("paper_figures.__main__")
+
+
+def _start(module: str) -> int:
+    """Import a module, which takes a second, and run its `main`; returns the exit status."""
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is not signal.SIG_IGN:  # as in the background of a script
+        signal.signal(signal.SIGINT, _leave)
+    main = import_module(module).main
+    try:
+        signal.signal(signal.SIGINT, usual)
+        status: int = main()
+    except KeyboardInterrupt:
+        status = STOPPED
+    if usual is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _leave)  # while the interpreter ends
+    return status
+
+
+def _leave(*_: Any) -> None:
+    """End without a word, as nothing has begun, or all is done; an exception might be caught."""
+    os._exit(STOPPED)
