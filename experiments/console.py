@@ -61,19 +61,21 @@ def ranking_lines(hypotheses: pd.DataFrame, space: StateSpace, top: int) -> Iter
         )
 
 
-def measure_lines(summary: pd.Series, quantiles: pd.DataFrame, top: int) -> Iterator[str]:
+def measure_lines(summary: pd.Series, ranks: pd.DataFrame, top: int) -> Iterator[str]:
     """The study's three measures."""
     yield (
         f"measures        final-state error {summary['final_state_error']:.3f}; violation distance "
         f"{summary['violation_distance']:.2f} each (floor {summary['violation_floor']:.2f}), "
         f"{summary['violation_distance_pooled']:.2f} pooled"
     )
-    sizes = quantiles["demonstrations"]
-    for _, row in quantiles[sizes.isin([1, 5, 9, sizes.max()])].iterrows():
+    sizes = ranks["demonstrations"]
+    for size in sorted({1, 5, 9, sizes.max()}.intersection(sizes)):
+        rows = ranks[sizes == size]
+        low, median, high = rows["rank"].quantile([0.1, 0.5, 0.9])
         yield (
-            f"                rank of the truth after {row['demonstrations']:.0f}: median "
-            f"{row['median']:g} (80 % between {row['q10']:g} and {row['q90']:g}), top {top} in "
-            f"{row[f'share_top_{top}']:.0%} of random subsets"
+            f"                rank of the truth after {size}: median {median:g} (80 % between "
+            f"{low:g} and {high:g}), top {top} in {rows[f'share_top_{top}'].mean():.0%} of random "
+            "subsets"
         )
 
 

@@ -12,45 +12,38 @@ from mlci.inference import confidence, rank_constraints
 from mlci.metrics import random_subsets, truth_ranks
 from mlci.spaces import Bools, Floats, Ints, StateSpace
 
-# They depend on the truth alone, open with its name only, and collate keeps one copy of each.
-TRUTH_TABLES = ("attempts", "dimensions", "paths")
+# They are the same for all grids, time steps and actions: collate keeps one copy of each, opened
+# by these columns alone.
+TRUTH_TABLES = {
+    "attempts": ("truth", "seed"),
+    "dimensions": ("truth",),
+    "paths": ("truth", "seed"),
+}
 
 _PATH_EVERY = 5  # samples of a path between those that its table keeps
 
 
-def rank_tables(
+def rank_table(
     settings: Settings, phi: Floats, violated: Bools, reachable: Bools, rng: np.random.Generator
-) -> dict[str, pd.DataFrame]:
-    """Rank of the truth over random subsets of the demonstrations, and its quantiles."""
+) -> pd.DataFrame:
+    """A row a random subset of the demonstrations: the rank of the truth after them."""
     truth = settings.candidates.inside(settings.constraint)
     wanted = settings.ranks
     rows = []
     for subsets in random_subsets(len(phi), wanted.demonstrations, wanted.subsets, rng):
+        rank = truth_ranks(phi, violated, truth, subsets)
         rows.append(
             pd.DataFrame(
                 {
                     "demonstrations": subsets.shape[1],
                     "subset": np.arange(len(subsets)),
                     "reachable": np.sum(reachable[subsets], axis=1),
-                    "rank": truth_ranks(phi, violated, truth, subsets),
+                    "rank": rank,
+                    f"share_top_{wanted.top}": (rank <= wanted.top).astype(int),
                 }
             )
         )
-    ranks = pd.concat(rows, ignore_index=True)
-    by_size = ranks.groupby("demonstrations")["rank"]
-    quantiles = pd.DataFrame(
-        {
-            "q10": by_size.quantile(0.10),
-            "q25": by_size.quantile(0.25),
-            "median": by_size.median(),
-            "q75": by_size.quantile(0.75),
-            "q90": by_size.quantile(0.90),
-            f"share_top_{wanted.top}": (ranks["rank"] <= wanted.top)
-            .groupby(ranks["demonstrations"])
-            .mean(),
-        }
-    ).reset_index()
-    return {"ranks": ranks, "rank_quantiles": quantiles}
+    return pd.concat(rows, ignore_index=True)
 
 
 def ranking_table(

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.console import diagnosis_lines, measure_lines, ranking_lines, trial_line
-from experiments.measures import rank_tables, ranking_table, truth_tables
+from experiments.measures import rank_table, ranking_table, truth_tables
 from experiments.settings import Settings
 from experiments.stages import demonstrations, tabular_model
 from experiments.store import Store
@@ -38,9 +38,9 @@ def run_point(
 
     Returns:
         Tables by name: `trials`, a row a kept demonstration; `ranks`, a row a subset of
-        demonstrations; `rank_quantiles`, a row a number of demonstrations; `hypotheses`, a row a
-        hypothesis, ranked with all of them; `summary`, one row; and the TRUTH_TABLES `attempts`,
-        a row a start and goal pair, `paths`, and `dimensions` of the state.
+        demonstrations; `hypotheses`, a row a hypothesis, ranked with all of them; `summary`, one
+        row; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`, and
+        `dimensions` of the state.
     """
     trials = demonstrations(settings, store)
     kept = trials.kept(settings.demonstrations.keep)
@@ -84,11 +84,11 @@ def run_point(
     feasible = ~np.isnan(error)
 
     violated = hypotheses.violated_by(trials.states[kept])
-    each, floor = np.full((2, len(kept)), np.nan)
-    pooled = np.nan
+    each, floor, shares = np.full((3, len(kept)), np.nan)
     if feasible.any():
         distance = violation_distance(phi_truth[feasible], violated[feasible])
-        each[feasible], floor[feasible], pooled = distance.each, distance.floor, distance.pooled
+        each[feasible], floor[feasible] = distance.each, distance.floor
+        shares[feasible] = distance.shares
 
     tables = {
         "trials": pd.DataFrame(
@@ -99,9 +99,12 @@ def run_point(
                 "final_state_error": error,
                 "violation_distance": each,
                 "violation_floor": floor,
+                "violation_distance_pooled": shares,
             }
         ),
-        **rank_tables(settings, phi, violated, reachable, _stream(settings.seed, _SUBSETS, 0)),
+        "ranks": rank_table(
+            settings, phi, violated, reachable, _stream(settings.seed, _SUBSETS, 0)
+        ),
         "hypotheses": ranking_table(
             hypotheses, phi[reachable], violated, settings.inference.prior
         ).assign(covered_by_truth=hypotheses.inside(settings.constraint)),
@@ -117,7 +120,7 @@ def run_point(
                     "final_state_error": _mean(error[feasible]),
                     "violation_distance": _mean(each[feasible]),
                     "violation_floor": _mean(floor[feasible]),
-                    "violation_distance_pooled": pooled,
+                    "violation_distance_pooled": _mean(shares[feasible]),
                     "stay": diagnosis.stay,
                     "leave": diagnosis.leave,
                     "cells_crossed": diagnosis.cells_crossed,
@@ -133,7 +136,7 @@ def run_point(
     for line in ranking_lines(tables["hypotheses"], system.space, top):
         log(line)
     summary = tables["summary"].iloc[0]
-    for line in measure_lines(summary, tables["rank_quantiles"], top):
+    for line in measure_lines(summary, tables["ranks"], top):
         log(line)
     return tables
 

@@ -186,6 +186,7 @@ class Settings(ModelSettings):
             "actions": actions if isinstance(actions, int) else "x".join(map(str, actions)),
             "dt": self.dt,
             "samples": self.transition.samples,
+            "seed": self.seed,
         }
 
 

@@ -103,19 +103,19 @@ def read_study(folder: Path) -> Study | None:
 
 def write_plan(folder: Path, points: Sequence[tuple[Point, Sequence[str]]]) -> None:
     """List the points of a sweep that starts, each with its overrides; tables stay as they are."""
-    before = _whole_study(folder)
+    before = whole_study(folder)
     planned = {point.identity: tuple(overrides) for point, overrides in points}
     Study(folder, planned, before.collated if before else None).save()
 
 
 def write_collated(folder: Path, collated: Collated) -> None:
     """List what the tables came from; the plan stays as it is."""
-    before = _whole_study(folder)
+    before = whole_study(folder)
     points = before.points if before else {identity: () for identity in collated.points}
     Study(folder, points, collated).save()
 
 
-def _whole_study(folder: Path) -> Study | None:
+def whole_study(folder: Path) -> Study | None:
     """The study of a folder, or None if there is none that is whole."""
     try:
         return read_study(folder)

@@ -1,6 +1,7 @@
 """Tables as CSV: one a measure and point, then one a measure for the whole study.
 
-Collating copies rows as text, so a study's table holds exactly the numbers that points wrote.
+Collating copies rows as text, so a study's table holds exactly the numbers that points wrote. What
+`experiments.aggregate` makes of these tables stands beside them.
 """
 
 from __future__ import annotations
@@ -16,12 +17,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import pandas as pd
 
+from experiments.aggregate import study_tables
 from experiments.examples import example_tables
 from experiments.measures import TRUTH_TABLES
 from experiments.schema import plain
 from experiments.settings import Settings
 from experiments.store import digest, replacing
-from experiments.study import Collated, write_collated
+from experiments.study import Collated, whole_study, write_collated
 
 if TYPE_CHECKING:
     from experiments.record import Point
@@ -34,7 +36,7 @@ class CollateError(Exception):
 def opening_columns(measure: str, settings: Settings) -> dict[str, str | int | float]:
     """The values that open every row of a point's table."""
     columns = settings.columns
-    return {"truth": columns["truth"]} if measure in TRUTH_TABLES else columns
+    return {name: columns[name] for name in TRUTH_TABLES.get(measure, columns)}
 
 
 def table_bytes(measure: str, frame: pd.DataFrame, settings: Settings) -> bytes:
@@ -88,7 +90,7 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
     names = sorted({name for record in records.values() for name in record["files"]} - {"log.txt"})
     alone = [[point] for point in ordered]
     alone_extra = _extra_columns(alone, "", flat)
-    digests = {}
+    digests, joined = {}, {}
     with ExitStack() as written:  # no table takes its place unless all are whole
         for name in names:
             groups, extra = alone, alone_extra
@@ -102,10 +104,13 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
             file = written.enter_context(replacing(folder / "tables" / name))
             first = [(group[0], records[group[0].identity]["files"].get(name)) for group in groups]
             digests[name] = _join(file, name, first, extra, flat)
-        for name, frame in example_tables(ordered).items():
+            file.flush()
+            joined[Path(name).stem] = Path(file.name)
+        for name, frame in {**example_tables(ordered), **study_tables(joined)}.items():
             data = csv_bytes(frame)
             written.enter_context(replacing(folder / "tables" / f"{name}.csv")).write(data)
             digests[f"{name}.csv"] = digest(data)
+    _forget_others(folder, digests)
     git = [record["git"] for record in records.values()]
     started = [record["started"] for record in records.values()]
     collated = Collated(
@@ -118,6 +123,14 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
     )
     write_collated(folder, collated)
     return [folder / "tables" / name for name in sorted(digests)]
+
+
+def _forget_others(folder: Path, tables: Mapping[str, str]) -> None:
+    """Remove the tables that the study listed before and does not have any more."""
+    before = whole_study(folder)
+    for name in before.collated.tables if before and before.collated else ():
+        if name not in tables:
+            (folder / "tables" / name).unlink(missing_ok=True)
 
 
 def _read_record(point: Point) -> dict[str, Any]:

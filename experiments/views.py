@@ -14,7 +14,7 @@ from experiments.study import Study
 from experiments.tables import flatten
 
 _SHORT = 12  # characters of an identity that are shown; any that are enough can be typed
-_COLUMNS = ("truth", "cells", "actions", "dt", "samples")
+_COLUMNS = ("truth", "cells", "actions", "dt", "samples", "seed")
 
 
 def study_list(archive: Archive, width: int | None) -> Iterator[str]:
@@ -63,7 +63,7 @@ def point_list(
 def summary_list(points: Sequence[KeptPoint], width: int | None) -> Iterator[str]:
     """A line for each finished point: what its config has of its own, and its summary."""
     # The summary opens with columns that say the same as these keys.
-    said = ("truth.", "dt", "actions", "grid.shape", "transition.samples")
+    said = ("truth.", "dt", "actions", "grid.shape", "transition.samples", "seed")
     extra = [key for key in varying(points) if not key.startswith(said)]
     facts: list[dict[str, object]] = [
         {

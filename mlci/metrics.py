@@ -35,12 +35,18 @@ class ViolationDistance:
         each: (N,) sum_i |Phi_i - D_i|.
         floor: (N,) sum_i 2 Phi_i (1 - Phi_i): what `each` is on average for demonstrations drawn
             from the tabular model itself.
-        pooled: sum_i |mean Phi_i - mean D_i|, which does go to 0 for those.
+        shares: (N,) sum_i s_i (Phi_i - D_i), where s_i is the sign of the mean of Phi_i - D_i over
+            all demonstrations: what each adds to the pooled distance.
     """
 
     each: Floats
     floor: Floats
-    pooled: float
+    shares: Floats
+
+    @property
+    def pooled(self) -> float:
+        """sum_i |mean Phi_i - mean D_i|, the mean of `shares`; it does go to 0 for those."""
+        return float(np.mean(self.shares))
 
 
 def violation_distance(phi: ArrayLike, violated: ArrayLike) -> ViolationDistance:
@@ -51,10 +57,11 @@ def violation_distance(phi: ArrayLike, violated: ArrayLike) -> ViolationDistance
         violated: (N, C) what the demonstrations violate.
     """
     phi, observed = np.asarray(phi, dtype=float), np.asarray(violated, dtype=float)
+    excess = phi - observed
     return ViolationDistance(
-        each=np.sum(np.abs(phi - observed), axis=1),
+        each=np.sum(np.abs(excess), axis=1),
         floor=np.sum(2 * phi * (1 - phi), axis=1),
-        pooled=float(np.sum(np.abs(np.mean(phi, axis=0) - np.mean(observed, axis=0)))),
+        shares=excess @ np.sign(np.mean(excess, axis=0)),
     )
 
 

@@ -46,6 +46,8 @@ def test_violation_distance_by_hand() -> None:
     distance = violation_distance([[0.5, 1.0], [0.1, 0.0]], [[True, False], [False, False]])
     np.testing.assert_allclose(distance.each, [1.5, 0.1])
     np.testing.assert_allclose(distance.floor, [0.5, 0.18])
+    # On average -0.2 and 0.5 from what was observed.
+    np.testing.assert_allclose(distance.shares, [0.5 + 1.0, -0.1])
     assert distance.pooled == pytest.approx(0.2 + 0.5)
 
 

@@ -52,14 +52,14 @@ def test_finished_point_has_a_record_and_exact_tables(settings: Settings, tmp_pa
     point = finished(settings, tmp_path, seed=1)
     assert point.is_done()
     table = pd.read_csv(point.folder / "trials.csv")
-    assert list(table.columns[:5]) == ["truth", "cells", "actions", "dt", "samples"]
-    assert table.iloc[0, :5].tolist() == ["wall", 96, 3, 0.5, 1]
+    assert list(table.columns[:6]) == ["truth", "cells", "actions", "dt", "samples", "seed"]
+    assert table.iloc[0, :6].tolist() == ["wall", 96, 3, 0.5, 1, 1]
     lines: list[str] = []
     computed = run_point(point.settings, Store(tmp_path / "store"), lines.append)
     assert {path.stem for path in point.folder.glob("*.csv")} == set(computed)
     for name, frame in computed.items():
         table = pd.read_csv(point.folder / f"{name}.csv")
-        opening = 1 if name in TRUTH_TABLES else 5
+        opening = len(TRUTH_TABLES.get(name, point.settings.columns))
         assert list(table.columns[opening:]) == list(frame.columns)
         for column in frame.columns:
             np.testing.assert_array_equal(table[column], frame[column])
@@ -121,10 +121,13 @@ def test_collate_sorts_by_size_whatever_the_order(settings: Settings, tmp_path: 
     collate(points[::-1], tmp_path / "two")
     names = {path.name for path in points[0].folder.glob("*.csv")}
     written = {path.name for path in (tmp_path / "one" / "tables").iterdir()}
-    assert written == names | {f"{name}.csv" for name in example_tables(points)}
-    for name in names:
+    made = {*example_tables(points), "measures", "rank_curve"}
+    assert written == names | {f"{name}.csv" for name in made}
+    for name in written:
         one, two = (tmp_path / study / "tables" / name for study in ["one", "two"])
         assert one.read_bytes() == two.read_bytes()
+        if name not in names:
+            continue
         # What depends on the truth alone stands once.
         rows = points[:1] if Path(name).stem in TRUTH_TABLES else points[::-1]
         assert one.read_text() == joined(name, rows)
@@ -146,18 +149,18 @@ def test_collate_adds_columns_that_tell_points_apart(settings: Settings, tmp_pat
     ]
     collate(points, tmp_path / "study")
     tables = tmp_path / "study" / "tables"
-    ordered = [points[2], points[0], points[1]]
-    values = ['"[12, 8]",0,', '"[12, 8]",1,', '"[24, 4]",0,']
+    ordered = [points[2], points[1], points[0]]
+    values = ['"[12, 8]",', '"[24, 4]",', '"[12, 8]",']
     for name in ["trials.csv", "ranks.csv", "hypotheses.csv", "summary.csv"]:
-        expected = joined(name, ordered, "grid.shape,seed,", values)
+        expected = joined(name, ordered, "grid.shape,", values)
         assert (tables / name).read_text() == expected
     table = pd.read_csv(tables / "hypotheses.csv")
-    assert list(table.columns[:3]) == ["grid.shape", "seed", "truth"]
-    assert table["grid.shape"].tolist() == ["[12, 8]"] * 20 + ["[24, 4]"] * 10
-    assert table["seed"].tolist() == [0] * 10 + [1] * 10 + [0] * 10
+    assert list(table.columns[:2]) == ["grid.shape", "truth"]
+    assert table["grid.shape"].tolist() == ["[12, 8]"] * 10 + ["[24, 4]"] * 10 + ["[12, 8]"] * 10
+    assert table["seed"].tolist() == [0] * 20 + [1] * 10
     # Both grids have the same attempts, which stand once a seed.
     attempts = (tables / "attempts.csv").read_text()
-    assert attempts == joined("attempts.csv", ordered[:2], "seed,", ["0,", "1,"])
+    assert attempts == joined("attempts.csv", ordered[::2])
     assert pd.read_csv(tables / "attempts.csv")["seed"].tolist() == [0] * 6 + [1] * 6
     assert (tables / "dimensions.csv").read_text() == joined("dimensions.csv", points[:1])
 
@@ -226,6 +229,7 @@ def test_listing_keeps_plan_and_tables_apart(settings: Settings, tmp_path: Path)
     assert study.points == planned.points
     assert study.collated is not None
     assert study.collated.points == (points[1].identity, points[0].identity)
+    assert {"measures.csv", "rank_curve.csv", "trials.csv"} < set(study.collated.tables)
     for name, was in study.collated.tables.items():
         assert digest((folder / "tables" / name).read_bytes()) == was
     assert study.collated.started[0] <= study.collated.started[1]
@@ -234,6 +238,19 @@ def test_listing_keeps_plan_and_tables_apart(settings: Settings, tmp_path: Path)
     assert (folder / "study.json").read_bytes() == listing
     collate(points, folder)
     assert (folder / "study.json").read_bytes() == listing
+
+
+def test_a_table_that_is_not_made_any_more_goes(settings: Settings, tmp_path: Path) -> None:
+    point, folder = finished(settings, tmp_path), tmp_path / "study"
+    collate([point], folder)
+    listing = json.loads((folder / "study.json").read_text())
+    listing["collated"]["tables"]["former.csv"] = "0"
+    (folder / "study.json").write_text(json.dumps(listing))
+    for name in ("former.csv", "mine.csv"):
+        (folder / "tables" / name).touch()
+    collate([point], folder)
+    assert not (folder / "tables" / "former.csv").exists()
+    assert (folder / "tables" / "mine.csv").exists()
 
 
 def test_listing_that_is_broken_is_told_and_written_anew(
