@@ -1,46 +1,65 @@
 """Small tables of single points, for the figures that show one example rather than a sweep.
 
-Collating makes them for every study, a part for each truth: they are what is left of tables that
-grow with the number of points.
+Collating makes them for every study, a part for each truth, from tables of its points that are too
+large to keep beside the study.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
+
+from experiments.measures import box_table
+from mlci.constraints import ConstraintSet
+from mlci.grids import Grid
+from mlci.spaces import Ints
 
 if TYPE_CHECKING:
     from experiments.record import Point
 
 # The point that stands for a truth: these values, or the nearest that the study holds.
 CELLS, DT, ACTIONS = 400, 0.25, 9
+# The grids whose trajectories are compared, coarse to fine, or the nearest that the study holds.
+COMPARED = (100, 900, 1600)
 
-_PATH_EVERY = 2  # samples of the table `paths` between those that are drawn
+_ENOUGH = 0.9  # of the demonstrations are feasible in all compared grids at a dt that can be chosen
+_PATH_EVERY = 2  # samples of the table `paths` between those that are drawn of many paths
 _DECIMALS = 4  # of coordinates that are only drawn
 
 
 def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
-    """The tables of a study's examples.
+    """The tables of a study's examples, each opened by truth and the settings of a point.
 
     Args:
         points: finished points, in the order of the study's tables.
 
     Returns:
-        `example_ranking`, the table `hypotheses` of one point a truth, with its identity; and
-        `example_paths`, its demonstrations, thinned out.
+        Of one point a truth, `example_ranking`, its table `hypotheses` with Phi of one trial;
+        `example_paths`, its demonstrations, thinned out; `example_cells`, the cells of that
+        trial's sampled trajectory; `example_moves`, the moves from these cells. And of one trial a
+        truth in several grids, `compared_cells`, `compared_violations` and `compared_paths`.
     """
-    truths = sorted({point.settings.truth.name for point in points})
-    chosen = [
-        min((point for point in points if point.settings.truth.name == truth), key=_distance)
-        for truth in truths
-    ]
-    return {
-        "example_ranking": pd.concat([_ranking(point) for point in chosen], ignore_index=True),
-        "example_paths": pd.concat([_paths(point) for point in chosen], ignore_index=True),
+    tables: dict[str, list[pd.DataFrame]] = {
+        **{f"example_{name}": [] for name in ("ranking", "paths", "cells", "moves")},
+        **{f"compared_{name}": [] for name in ("cells", "violations", "paths")},
     }
+    for truth in sorted({point.settings.truth.name for point in points}):
+        of_truth = [point for point in points if point.settings.truth.name == truth]
+        example = min(of_truth, key=_distance)
+        for name, table in _example(example).items():
+            tables[name].append(table)
+        trial, alike = _comparison(example, of_truth)
+        for point in alike:
+            tables["compared_cells"].append(_cells(point, trial))
+            tables["compared_violations"].append(_violations(point, trial))
+        path = _of_trial(_read(example, "paths"), trial, "demonstration")
+        tables["compared_paths"].append(path.round(_DECIMALS))
+    return {name: _joined(parts) for name, parts in tables.items()}
 
 
 def _distance(point: Point) -> tuple[float, ...]:
@@ -55,16 +74,109 @@ def _distance(point: Point) -> tuple[float, ...]:
     )
 
 
-def _ranking(point: Point) -> pd.DataFrame:
-    """The ranked hypotheses of a point."""
-    table = pd.read_csv(point.folder / "hypotheses.csv")
+def _example(point: Point) -> dict[str, pd.DataFrame]:
+    """The tables of one point."""
+    probabilities = _read(point, "probabilities")
+    trial = int(probabilities["trial"].iloc[0]) if len(probabilities) else -1
+    phi = probabilities[["hypothesis", "trial", "unconstrained", "constrained"]]
+    ranking = _named(point, _read(point, "hypotheses")).merge(phi, on="hypothesis", how="left")
+    paths = _read(point, "paths")
+    place = paths.groupby("demonstration").cumcount()
+    last = paths.groupby("demonstration")["time"].transform("max") == paths["time"]
+    return {
+        "example_ranking": ranking,
+        "example_paths": paths[(place % _PATH_EVERY == 0) | last].round(_DECIMALS),
+        "example_cells": _cells(point, trial),
+        "example_moves": _moves(point),
+    }
+
+
+def _comparison(example: Point, points: Sequence[Point]) -> tuple[int, list[Point]]:
+    """The points that are compared, coarse to fine, and the trial; -1 if there is none for all.
+
+    They differ from the example in the grid and, all alike, in dt: the dt nearest to the
+    example's at which nearly all demonstrations are feasible in all of these grids, or, where
+    there is none, the most. The trial is the one of them that passes nearest to the truth.
+    """
+    choices = []
+    for dt in sorted({point.settings.dt for point in points}, key=lambda dt: abs(dt - DT)):
+        settings = replace(example.settings, dt=dt)
+        same = [
+            point for point in points if replace(point.settings, grid=settings.grid) == settings
+        ]
+        if same:
+            closest = [min(same, key=lambda p: abs(_count(p) - cells)) for cells in COMPARED]
+            alike = list({point.identity: point for point in closest}.values())
+            choices.append((_feasible_in_all(alike), alike))
+    demonstrations = len(_read(example, "trials"))
+    enough = [choice for choice in choices if len(choice[0]) >= _ENOUGH * demonstrations]
+    trials, alike = enough[0] if enough else max(choices, key=lambda choice: len(choice[0]))
+    paths = _read(example, "paths")
+    paths = paths[paths["demonstration"].isin(trials)]
+    names = list(example.settings.model.space.names)
+    distance = example.settings.constraint.signed_distance(paths[names].to_numpy())
+    return (int(paths["demonstration"].iloc[np.argmin(distance)]) if len(paths) else -1), alike
+
+
+def _count(point: Point) -> int:
+    """Cells of a point's grid."""
+    return math.prod(point.settings.grid.shape)
+
+
+def _feasible_in_all(points: Sequence[Point]) -> Ints:
+    """Trials whose goal the tabular agent reaches under the truth, at each of some points."""
+    tables = [_read(point, "trials") for point in points]
+    return np.array(
+        sorted(set.intersection(*(set(table["trial"][table["feasible"]]) for table in tables))),
+        dtype=np.int64,
+    )
+
+
+def _cells(point: Point, trial: int) -> pd.DataFrame:
+    """The cells that a trial's sampled trajectory visits, with their corners."""
+    visits = _named(point, _of_trial(_read(point, "sampled"), trial).copy())
+    return _with_boxes(visits, "cell", _grid_boxes(point.settings.cells))
+
+
+def _moves(point: Point) -> pd.DataFrame:
+    """The moves of the cells that the first trajectory visits, with both cells' corners."""
+    boxes = _grid_boxes(point.settings.cells)
+    moves = _with_boxes(_read(point, "moves"), "cell", boxes)
+    return _with_boxes(moves, "successor", boxes.add_prefix("successor_"))
+
+
+def _violations(point: Point, trial: int) -> pd.DataFrame:
+    """The hypotheses that a trial's demonstration and sampled trajectory violate, with corners."""
+    boxes = box_table("hypothesis", point.settings.candidates).drop(columns="hypothesis")
+    return _with_boxes(_of_trial(_read(point, "violations"), trial), "hypothesis", boxes)
+
+
+def _grid_boxes(grid: Grid) -> pd.DataFrame:
+    """The corners of every cell of a grid."""
+    return box_table("cell", ConstraintSet(grid.space, *grid.corners)).drop(columns="cell")
+
+
+def _with_boxes(rows: pd.DataFrame, key: str, boxes: pd.DataFrame) -> pd.DataFrame:
+    """Rows with the corners of the box that their column `key` numbers, as they are drawn."""
+    return rows.join(boxes.round(_DECIMALS), on=key)
+
+
+def _of_trial(table: pd.DataFrame, trial: int, column: str = "trial") -> pd.DataFrame:
+    """The rows of one trial."""
+    return table[table[column] == trial]
+
+
+def _read(point: Point, name: str) -> pd.DataFrame:
+    """A table of a point."""
+    return pd.read_csv(point.folder / f"{name}.csv")
+
+
+def _named(point: Point, table: pd.DataFrame) -> pd.DataFrame:
+    """A table opened by the point's identity."""
     table.insert(0, "point", point.identity)
     return table
 
 
-def _paths(point: Point) -> pd.DataFrame:
-    """The demonstrations of a point, of each every other sample and the last."""
-    table = pd.read_csv(point.folder / "paths.csv")
-    place = table.groupby("demonstration").cumcount()
-    last = table.groupby("demonstration")["time"].transform("max") == table["time"]
-    return table[(place % _PATH_EVERY == 0) | last].round(_DECIMALS)
+def _joined(parts: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Tables below one another; the type of a column is not left to those without rows."""
+    return pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)

@@ -18,6 +18,7 @@ TRUTH_TABLES = {
     "attempts": ("truth", "seed"),
     "dimensions": ("truth",),
     "paths": ("truth", "seed"),
+    "regions": ("truth",),
 }
 
 _PATH_EVERY = 5  # samples of a path between those that its table keeps
@@ -64,9 +65,7 @@ def ranking_table(
     ]
     return pd.DataFrame(
         {
-            "hypothesis": np.arange(len(hypotheses)),
-            **{f"lower_{d}": hypotheses.lower[:, k] for k, d in enumerate(hypotheses.space.names)},
-            **{f"upper_{d}": hypotheses.upper[:, k] for k, d in enumerate(hypotheses.space.names)},
+            **box_table("hypothesis", hypotheses),
             "feasible": ranking.feasible,
             "violating_demonstrations": np.sum(violated, axis=0),
             "gain": ranking.gain,
@@ -100,7 +99,20 @@ def truth_tables(settings: Settings, trials: TrialSet, kept: Ints) -> dict[str, 
             }
         ),
         "dimensions": dimension_table(space),
+        "regions": box_table("region", settings.constraint),
     }
+
+
+def box_table(what: str, boxes: ConstraintSet) -> pd.DataFrame:
+    """A row a box, numbered in the column `what`: its corners, infinite where it is free."""
+    names = boxes.space.names
+    return pd.DataFrame(
+        {
+            what: np.arange(len(boxes)),
+            **{f"lower_{name}": boxes.lower[:, k] for k, name in enumerate(names)},
+            **{f"upper_{name}": boxes.upper[:, k] for k, name in enumerate(names)},
+        }
+    )
 
 
 def dimension_table(space: StateSpace) -> pd.DataFrame:

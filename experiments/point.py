@@ -12,6 +12,7 @@ from experiments.measures import rank_table, ranking_table, truth_tables
 from experiments.settings import Settings
 from experiments.stages import demonstrations, tabular_model
 from experiments.store import Store
+from experiments.trajectories import probability_table, telling_trial, trajectory_tables
 from mlci.maxent import expected_violations, log_partition, sample_moves, violation_probabilities
 from mlci.mdp import action_grid, forbid
 from mlci.metrics import (
@@ -39,8 +40,9 @@ def run_point(
     Returns:
         Tables by name: `trials`, a row a kept demonstration; `ranks`, a row a subset of
         demonstrations; `hypotheses`, a row a hypothesis, ranked with all of them; `summary`, one
-        row; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`, and
-        `dimensions` of the state.
+        row; `sampled`, `violations`, `moves` and `probabilities`, of single trajectories; and the
+        TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`, `dimensions` of the state,
+        and `regions` of the truth.
     """
     trials = demonstrations(settings, store)
     kept = trials.kept(settings.demonstrations.keep)
@@ -70,13 +72,15 @@ def run_point(
     constrained = forbid(mdp, np.arange(count, mdp.crosses.shape[1]))
     phi_truth = np.zeros_like(phi)
     error = np.full(len(kept), np.nan)
+    trajectories = {}
     for j, trial in enumerate(kept):
         log_z = log_partition(constrained, starts[j], goals[j], steps)
         if log_z[0, starts[j]] == -np.inf:
             continue
         phi_truth[j] = violation_probabilities(constrained, log_z, starts[j])[:count]
         rng = _stream(settings.seed, _ROLLOUTS, trial)
-        _, moves = sample_moves(constrained, log_z, starts[j], settings.rollouts, rng)
+        cells, moves = sample_moves(constrained, log_z, starts[j], settings.rollouts, rng)
+        trajectories[int(trial)] = cells[0], moves[0]
         controls = actions[mdp.action[moves]]
         substeps = int(np.ceil(dt / settings.demonstrations.dt - 1e-9))
         final = rollout(system, trials.starts[trial], controls, dt, substeps)[:, -1]
@@ -90,6 +94,9 @@ def run_point(
         each[feasible], floor[feasible] = distance.each, distance.floor
         shares[feasible] = distance.shares
 
+    covered = hypotheses.inside(settings.constraint)
+    telling = telling_trial(feasible, phi, covered)
+    shown = int(kept[telling]) if feasible.any() else None
     tables = {
         "trials": pd.DataFrame(
             {
@@ -107,7 +114,11 @@ def run_point(
         ),
         "hypotheses": ranking_table(
             hypotheses, phi[reachable], violated, settings.inference.prior
-        ).assign(covered_by_truth=hypotheses.inside(settings.constraint)),
+        ).assign(covered_by_truth=covered),
+        **trajectory_tables(
+            mdp, trajectories, dict(zip(kept.tolist(), violated, strict=True)), shown
+        ),
+        "probabilities": probability_table(shown, phi[telling], phi_truth[telling]),
         **truth_tables(settings, trials, kept),
         "summary": pd.DataFrame(
             [

@@ -17,17 +17,33 @@ from types import ModuleType
 
 import pandas as pd
 
-from paper_figures import hypothesis_map, rank_curve
+from paper_figures import (
+    final_state_error,
+    hypothesis_map,
+    overview,
+    rank_curve,
+    state_space,
+    trajectories,
+    violation_distance,
+)
 from paper_figures.origin import figure_note, read_note, sentence, write_note
 from paper_figures.selection import Unsuited
 from paper_figures.style import save
 
 # Every figure there is. A module has
 #   TABLES        the tables that it needs, each with the columns that it needs of it;
-#   draw(**them)  the figure, and facts(**them), what its caption says, a fact a line; both may
-#                 raise Unsuited;
+#   draw(**them)  the figure; it may raise Unsuited;
+#   facts(**them) what its caption says, a fact a line;
 #   EACH          a column, if there is to be one figure for each of its values.
-FIGURES: tuple[ModuleType, ...] = (hypothesis_map, rank_curve)
+FIGURES: tuple[ModuleType, ...] = (
+    overview,
+    state_space,
+    final_state_error,
+    violation_distance,
+    rank_curve,
+    trajectories,
+    hypothesis_map,
+)
 
 
 def main() -> int:
@@ -71,9 +87,8 @@ def draw_study(study: Path) -> list[Path]:
         try:
             for suffix, chosen in _versions(module, tables):
                 path = study / "figures" / f"{name}{suffix}"
-                facts = module.facts(**chosen)
                 drawn.append(save(module.draw(**chosen), path, source))
-                lines = [facts.rstrip("\n"), "", f"Source: {source}."]
+                lines = [module.facts(**chosen), "", f"Source: {source}."]
                 path.with_name(path.name + ".txt").write_text("\n".join(lines) + "\n")
                 used = {f"{table}.csv": contents[table] for table in chosen}
                 notes[path.name] = figure_note(path, name, used)

@@ -6,14 +6,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from paper_figures.plane import Plane, outline
+from paper_figures.plane import Plane, numbered, outline
 from paper_figures.selection import described
-from paper_figures.style import COLUMN, EDGE, PATH, RC, TRUTH, VIOLATED, new_figure
+from paper_figures.style import COLUMN, EDGE, GAIN, PATH, RC, TRUTH, VIOLATED, new_figure
 
 TABLES = {
     "example_ranking": ("truth", "cells", "actions", "dt", "hypothesis", "gain", "rank"),
@@ -39,44 +38,19 @@ def draw(
     hypotheses, plane = example_ranking, Plane.of(example_ranking, dimensions)
     figure, axes = new_figure(COLUMN, 3.1)
     with plt.rc_context(RC):
-        boxes = plane.rectangles(hypotheses)
         feasible = hypotheses["feasible"].to_numpy(dtype=bool)
         gain = hypotheses["gain"].to_numpy(dtype=float)
         finite = gain[feasible & np.isfinite(gain)]
         top = max(float(finite.max(initial=0.0)), 1e-3)
-        cells = PatchCollection(
-            [box for box, keep in zip(boxes, feasible, strict=True) if keep],
-            cmap="YlGnBu",
-            edgecolor=EDGE,
-            linewidth=0.3,
-        )
         # Gains spread over decades: the square root keeps the small ones apart from none.
-        cells.set_array(np.sqrt(np.minimum(gain[feasible], top)))
+        shown = np.sqrt(np.minimum(gain[feasible], top))
+        cells = plane.cells(axes, hypotheses[feasible], array=shown, cmap=GAIN)
         cells.set_clim(0, np.sqrt(top))
-        axes.add_collection(cells)
-        axes.add_collection(
-            PatchCollection(
-                [box for box, keep in zip(boxes, feasible, strict=True) if not keep],
-                facecolor=VIOLATED,
-                edgecolor=EDGE,
-                linewidth=0.3,
-            )
-        )
+        plane.cells(axes, hypotheses[~feasible], facecolor=VIOLATED)
         _draw_paths(axes, example_paths, plane)
-        for row, box in zip(hypotheses.itertuples(), boxes, strict=True):
+        for row, box in zip(hypotheses.itertuples(), plane.rectangles(hypotheses), strict=True):
             if row.feasible and row.rank <= TOP and row.gain > 0:
-                axes.add_patch(outline(box, "black", 1.0))
-                middle = (box.get_x() + box.get_width() / 2, box.get_y() + box.get_height() / 2)
-                axes.text(
-                    *middle,
-                    f"{row.rank:g}",
-                    ha="center",
-                    va="center",
-                    fontsize=7,
-                    fontweight="bold",
-                    bbox={"boxstyle": "circle,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
-                    zorder=5,
-                )
+                numbered(axes, box, row.rank)
             if getattr(row, "covered_by_truth", False):
                 axes.add_patch(outline(box, TRUTH, 2.0))
         plane.dress(axes)

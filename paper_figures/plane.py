@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
 from matplotlib.patches import Rectangle
+
+from paper_figures.style import EDGE
 
 _TURN_TICKS = {0.0: "0", 0.25: r"$\pi/2$", 0.5: r"$\pi$", 0.75: r"$3\pi/2$", 1.0: r"$2\pi$"}
 
@@ -55,6 +59,44 @@ class Plane:
                 points = np.insert(points, np.flatnonzero(jump) + 1, np.nan, axis=0)
         return points
 
+    def cells(self, axes: Axes, boxes: pd.DataFrame, **style: Any) -> PatchCollection:
+        """Draw boxes, which may be coloured by `array`; the edges thin."""
+        patches = self.rectangles(boxes)
+        drawn = PatchCollection(patches, **{"edgecolor": EDGE, "linewidth": 0.3, **style})
+        axes.add_collection(drawn)
+        return drawn
+
+    def regions(self, boxes: pd.DataFrame) -> list[Rectangle]:
+        """Each box, and its copies where it leaves a periodic dimension on one side."""
+        found = self.rectangles(boxes)
+        for column, dimension in enumerate((self.x, self.y)):
+            if dimension["periodic"]:
+                period = dimension["upper"] - dimension["lower"]
+                shift = np.where(np.arange(2) == column, period, 0.0)
+                found = [
+                    Rectangle(tuple(corner), box.get_width(), box.get_height())
+                    for box in found
+                    for turns in (-1, 0, 1)
+                    for corner in [np.array(box.get_xy()) + turns * shift]
+                    if corner[column] < dimension["upper"]
+                    and corner[column] + (box.get_width(), box.get_height())[column]
+                    > dimension["lower"]
+                ]
+        return found
+
+    def near(self, boxes: pd.DataFrame, point: tuple[float, float]) -> list[Rectangle]:
+        """Each box, moved by whole periods to where its centre is nearest to a point."""
+        found = self.rectangles(boxes)
+        for column, dimension in enumerate((self.x, self.y)):
+            if dimension["periodic"]:
+                period = dimension["upper"] - dimension["lower"]
+                for box in found:
+                    corner = list(box.get_xy())
+                    turns = np.round((centre(box)[column] - point[column]) / period)
+                    corner[column] -= turns * period
+                    box.set_xy(corner)
+        return found
+
     def dress(self, axes: Axes) -> None:
         """Set limits and labels with units; a whole turn in radians has ticks by its quarters."""
         axes.set_xlim(self.x["lower"], self.x["upper"])
@@ -71,12 +113,17 @@ class Plane:
                 axis.set_ticks([turn * share for share in _TURN_TICKS], list(_TURN_TICKS.values()))
 
 
+def centre(box: Rectangle) -> tuple[float, float]:
+    """The middle of a box."""
+    return (box.get_x() + box.get_width() / 2, box.get_y() + box.get_height() / 2)
+
+
 def axis_label(dimension: pd.Series) -> str:
     """The name of a dimension with its unit."""
     return f"{dimension['name'].replace('_', ' ')} [{dimension['unit']}]"
 
 
-def outline(box: Rectangle, colour: str, width: float, **options: object) -> Rectangle:
+def outline(box: Rectangle, colour: str, width: float, **options: Any) -> Rectangle:
     """The border of a box, above what fills it."""
     return Rectangle(
         box.get_xy(),
@@ -87,3 +134,11 @@ def outline(box: Rectangle, colour: str, width: float, **options: object) -> Rec
         linewidth=width,
         **{"zorder": 4, **options},
     )
+
+
+def numbered(axes: Axes, box: Rectangle, number: float, size: float = 7) -> None:
+    """Outline a box and write its rank into it, on white."""
+    axes.add_patch(outline(box, "black", 1.0))
+    plate = {"boxstyle": "circle,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
+    style = {"fontsize": size, "fontweight": "bold", "bbox": plate, "zorder": 5}
+    axes.text(*centre(box), f"{number:g}", ha="center", va="center", **style)

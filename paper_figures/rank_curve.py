@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import matplotlib.pyplot as plt
 import pandas as pd
@@ -16,12 +17,13 @@ from paper_figures.style import GUIDE, PAGE, RC, mark, new_figure
 TABLES = {
     "rank_curve": (
         *("truth", "cells", "actions", "dt", "samples", "demonstrations"),
-        *("median", "q25", "q75", "median_low", "median_high"),
+        *("median", "q25", "q75", "median_low", "median_high", "seeds"),
     )
 }
 PAPER = 9  # demonstrations after which the paper finds the truth among the first
 
 _TICKS = (1, 2, 5, 10, 20, 50, 100)
+_MARKED = 4  # demonstrations between the marks of a curve
 _KEYS = ("truth", "cells", "dt", "demonstrations")
 
 
@@ -48,8 +50,10 @@ def draw(rank_curve: pd.DataFrame) -> Figure:
                 panel = curves[(curves["dt"] == dt) & (curves["truth"] == truth)]
                 left, right = grid[row][2 * column : 2 * column + 2]
                 for number, (cells, curve) in enumerate(panel.groupby("cells", sort=True)):
-                    _draw_rank(left, curve, mark(int(cells), number))
-                    _draw_share(right, curve, top, mark(int(cells), number))
+                    # Marks of one curve between those of the others, where curves coincide.
+                    style = {**mark(int(cells), number), "markevery": (number % _MARKED, _MARKED)}
+                    _draw_rank(left, curve, style)
+                    _draw_share(right, curve, top, style)
                 left.axhspan(0.9, top, color="#000000", alpha=0.05, linewidth=0)
                 left.set_yscale("log")
                 left.set_ylim(0.9, 100)
@@ -73,13 +77,17 @@ def facts(rank_curve: pd.DataFrame) -> str:
     curves, top = paper_rows(rank_curve, _KEYS), _top(rank_curve)
     share = f"share_top_{top}"
     at = min(PAPER, int(curves["demonstrations"].max()))
+    how = (
+        "two-level bootstrap intervals (seeds, then subsets)"
+        if curves["seeds"].min() > 1
+        else "bootstrap intervals over subsets: with one seed they tell nothing of others"
+    )
     lines = [
         f"Rank of the true constraint among all hypotheses, {curves['actions'].iloc[0]} actions.",
         "Curves: median over random subsets of the demonstrations and over seeds.",
         "Bands: first to third quartile, the spread between subsets.",
         f"Beside them: share of the subsets that rank the truth among the first {top}.",
-        "Uncertainty: the share's bars, and the intervals below, are 95 % two-level bootstrap "
-        "intervals (seeds, then subsets).",
+        f"Uncertainty: the bands of the shares, and the intervals below, are 95 % {how}.",
         f"Grey: rank 1 to {top}; dotted: {PAPER} demonstrations.",
         f"After {at} demonstrations:",
     ]
@@ -87,7 +95,7 @@ def facts(rank_curve: pd.DataFrame) -> str:
         part, low, high = (100 * getattr(row, share + end) for end in ("", "_low", "_high"))
         lines.append(
             f"  {row.truth.upper()}, {row.cells} cells, dt {row.dt:g} s: median rank "
-            f"{row.median:g} ({row.median_low:g} to {row.median_high:g}), "
+            f"{row.median:.3g} ({row.median_low:.3g} to {row.median_high:.3g}), "
             f"in the top {top} {part:.0f} % ({low:.0f} to {high:.0f})"
         )
     return "\n".join(lines)
@@ -101,20 +109,20 @@ def _top(rank_curve: pd.DataFrame) -> int:
     return top
 
 
-def _draw_rank(axes: Axes, curve: pd.DataFrame, style: dict[str, str]) -> None:
+def _draw_rank(axes: Axes, curve: pd.DataFrame, style: dict[str, Any]) -> None:
     """Median and quartiles."""
     x = curve["demonstrations"]
     axes.fill_between(x, curve["q25"], curve["q75"], color=style["color"], alpha=0.15, linewidth=0)
     label = f"{curve['cells'].iloc[0]} cells"
-    axes.plot(x, curve["median"], label=label, markevery=4, **style)
+    axes.plot(x, curve["median"], label=label, **style)
 
 
-def _draw_share(axes: Axes, curve: pd.DataFrame, top: int, style: dict[str, str]) -> None:
+def _draw_share(axes: Axes, curve: pd.DataFrame, top: int, style: dict[str, Any]) -> None:
     """Share among the first, in percent, with its interval."""
     middle, low, high = (100 * curve[f"share_top_{top}{end}"] for end in ("", "_low", "_high"))
     x = curve["demonstrations"]
     axes.fill_between(x, low, high, color=style["color"], alpha=0.15, linewidth=0)
-    axes.plot(x, middle, markevery=4, **style)
+    axes.plot(x, middle, **style)
 
 
 def _entries(axes: Axes) -> tuple[list[object], list[str]]:

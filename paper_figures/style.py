@@ -23,6 +23,10 @@ CELL_COLOURS = {100: "#cc79a7", 400: "#009e73", 900: "#d9a400", 1600: "#0072b2"}
 OTHER_MARKS = ("D", "v", "P", "*")
 OTHER_COLOURS = ("#000000", "#d55e00", "#56b4e9", "#7f7f7f")
 TRUTH = "#d55e00"
+TRUTHS = (TRUTH, "#f3b28a")  # shades of one colour, for several truths in one figure
+DEMONSTRATION, SAMPLED = "#0072b2", "#cc79a7"
+START, GOAL = "#56b4e9", "#009e73"
+GAIN, CHANCE = "YlGnBu", "PuRd"  # one colour each, dark for much: a hypothesis's gain and its Phi
 PATH = "#444444"  # of demonstrations among many
 EDGE = "#b0b0b0"  # between hypotheses
 VIOLATED = "#f1f1f1"  # hypotheses that some demonstration violates
@@ -36,9 +40,13 @@ RC = {
     "ytick.labelsize": 7,
     "legend.fontsize": 7,
     "legend.frameon": False,
+    "legend.columnspacing": 1.2,
+    "legend.handlelength": 1.6,
+    "legend.handletextpad": 0.5,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.6,
+    "hatch.linewidth": 0.5,
     "lines.linewidth": 1.1,
     "lines.markersize": 4,
     "svg.hashsalt": "mlci",

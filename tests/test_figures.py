@@ -88,6 +88,7 @@ def curve_rows() -> pd.DataFrame:
         q75=middle + 2,
         median_low=middle - 0.5,
         median_high=middle + 0.25,
+        seeds=5,
         share_top_5=share,
         share_top_5_low=share - 0.05,
         share_top_5_high=share + 0.02,
@@ -152,8 +153,8 @@ def test_rank_curves_are_the_medians_bands_and_shares_of_the_table() -> None:
     said = rank_curve.facts(table)
     row = wanted[(wanted["demonstrations"] == 6) & (wanted["cells"] == 400)].iloc[-1]
     assert (
-        f"C2, 400 cells, dt 0.5 s: median rank {row['median']:g} ({row['median_low']:g} to "
-        f"{row['median_high']:g}), in the top 5 {100 * row['share_top_5']:.0f} %"
+        f"C2, 400 cells, dt 0.5 s: median rank {row['median']:.3g} ({row['median_low']:.3g} to "
+        f"{row['median_high']:.3g}), in the top 5 {100 * row['share_top_5']:.0f} %"
     ) in said
 
 
@@ -190,7 +191,7 @@ def test_a_study_is_drawn_from_its_tables_alone(tmp_path: Path) -> None:
     }
     digests = write_tables(tmp_path, {**map_tables, "rank_curve": curve_rows()})
     drawn = draw_study(tmp_path)
-    assert [path.name for path in drawn] == ["hypothesis_map_c1.png", "rank_curve.png"]
+    assert [path.name for path in drawn] == ["rank_curve.png", "hypothesis_map_c1.png"]
     note = json.loads((tmp_path / "figures" / "figures.json").read_text())["figures"]
     assert note["rank_curve"]["tables"] == {"rank_curve.csv": digests.pop("rank_curve.csv")}
     assert note["hypothesis_map_c1"]["tables"] == digests

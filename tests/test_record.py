@@ -111,6 +111,7 @@ def test_attempt_clears_what_a_killed_one_left(point: Point) -> None:
     assert point.record()["attempt"] == 5
     assert {path.name for path in point.folder.iterdir()} == {
         *("trials.csv", "ranks.csv", "hypotheses.csv", "summary.csv"),
+        *("sampled.csv", "violations.csv", "moves.csv", "probabilities.csv", "regions.csv"),
         *("attempts.csv", "paths.csv", "dimensions.csv", "log.txt", "record.json", ".lock"),
     }
 

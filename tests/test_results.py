@@ -22,7 +22,10 @@ from experiments.study import write_plan
 from experiments.tables import collate
 from paper_figures.origin import figure_note, write_note
 
-TABLES = "attempts, dimensions, hypotheses, paths, ranks, summary, trials"
+TABLES = (
+    "attempts, dimensions, hypotheses, moves, paths, probabilities, ranks, regions, sampled, "
+    "summary, trials, violations"
+)
 
 
 def finished(settings: Settings, folder: Path, **changes: object) -> Point:

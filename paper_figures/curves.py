@@ -1,0 +1,104 @@
+"""A measure against the time step, a curve a number of cells, with its intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullLocator
+
+from paper_figures.selection import Unsuited, paper_rows
+from paper_figures.style import mark
+
+COLUMNS = (
+    *("truth", "cells", "actions", "dt", "samples"),
+    *("measure", "mean", "low", "high", "seeds", "demonstrations"),
+)
+
+_ASIDE = 0.025  # share of dt that neighbouring curves are apart
+_REACHED = 0.5  # below this share of goals that can be reached, a mean stands for few cases
+_PALE = 0.4  # opacity of such a mean
+
+
+def paper_measure(measures: pd.DataFrame, measure: str) -> pd.DataFrame:
+    """The rows of one measure that a figure shows, with the column `reachable`.
+
+    Raises:
+        Unsuited: there are none, or rows differ in more than truth, cells and dt, or in nothing.
+    """
+    found = []
+    for name in (measure, "reachable"):
+        rows = measures[measures["measure"] == name]
+        if not len(rows):
+            raise Unsuited(f"table measures has no measure {name}")
+        found.append(paper_rows(rows, ("truth", "cells", "dt")))
+    rows, reachable = found
+    if not rows.duplicated("truth").any():
+        raise Unsuited("neither cells nor dt varies")
+    share = reachable.rename(columns={"mean": "reachable"})
+    keys = ["truth", "cells", "dt"]
+    return rows.merge(share[[*keys, "reachable"]], on=keys, how="left")
+
+
+def draw_curves(axes: Axes, rows: pd.DataFrame) -> None:
+    """Means against dt, a little aside of it so that no bar hides another; bars are intervals."""
+    groups = list(rows.groupby("cells", sort=True))
+    for number, (cells, curve) in enumerate(groups):
+        x = curve["dt"] * (1 + _ASIDE * (number - (len(groups) - 1) / 2))
+        style = mark(int(cells), number)
+        axes.plot(x, curve["mean"], color=style["color"], label=f"{cells} cells")
+        for few, part in curve.groupby(curve["reachable"] < _REACHED):
+            axes.errorbar(
+                x[part.index],
+                part["mean"],
+                yerr=(part["mean"] - part["low"], part["high"] - part["mean"]),
+                linestyle="",
+                capsize=1.5,
+                elinewidth=0.7,
+                alpha=_PALE if few else 1,
+                **style,
+            )
+    dts = sorted(rows["dt"].unique())
+    axes.set_xscale("log")
+    axes.set_xticks(dts, labels=[f"{dt:g}" for dt in dts])
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+def legend_entries(rows: pd.DataFrame) -> list[Line2D]:
+    """A sign for each number of cells."""
+    return [
+        Line2D([], [], label=f"{cells} cells", **mark(int(cells), number))
+        for number, cells in enumerate(sorted(rows["cells"].unique()))
+    ]
+
+
+def curve_facts(rows: pd.DataFrame, unit: str) -> Iterator[str]:
+    """A line for each mean, with its interval; `unit` follows the mean."""
+    for row in rows.itertuples():
+        value = f"{row.mean:.3g}{unit} ({row.low:.3g} to {row.high:.3g})"
+        yield (
+            f"  {row.truth.upper()}, {row.cells} cells, dt {row.dt:g} s: "
+            f"{'no value' if pd.isna(row.mean) else value}; goals reached "
+            f"{100 * row.reachable:.0f} %"
+        )
+
+
+def shown_facts(rows: pd.DataFrame) -> Iterator[str]:
+    """What holds for every curve of a figure."""
+    yield (
+        f"Actions: {rows['actions'].iloc[0]}; start points in a cell along each dimension: "
+        f"{rows['samples'].iloc[0]}; seeds: {rows['seeds'].max()}."
+    )
+    how = (
+        "two-level bootstrap intervals of the mean (seeds, then demonstrations within a seed)"
+        if rows["seeds"].min() > 1
+        else "bootstrap intervals of the mean over demonstrations (there is but one seed)"
+    )
+    yield f"Uncertainty: bars are 95 % {how}."
+    yield (
+        f"Pale: the tabular agent reaches fewer than {100 * _REACHED:.0f} % of the goals, and the "
+        "mean is over those alone. No mark: it reaches none."
+    )
+    yield "Marks are moved a little aside of their dt, so that no bar hides another."

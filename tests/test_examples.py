@@ -1,0 +1,134 @@
+"""The small tables of examples: which points and which trial they show, and what of them."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments import attempt, examples
+from experiments.examples import example_tables
+from experiments.record import Point
+from experiments.settings import GridSettings, Settings
+from mlci.grids import Grid
+
+SHAPES = [(12, 8), (24, 12), (30, 30)]
+
+
+@pytest.fixture(scope="module")
+def points(settings: Settings, tmp_path_factory: pytest.TempPathFactory) -> list[Point]:
+    """Two time steps in three grids, and another seed in one of them."""
+    results = tmp_path_factory.mktemp("results")
+    more = dataclasses.replace(settings.demonstrations, pairs=20, keep=8)
+    settings = dataclasses.replace(settings, horizon=4.0, demonstrations=more)
+    found = [
+        Point(dataclasses.replace(settings, grid=GridSettings(shape), dt=dt, seed=seed), results)
+        for shape in SHAPES
+        for dt in (0.25, 0.5)
+        for seed in ((0, 1) if shape == (24, 12) else (0,))
+    ]
+    for point in found:
+        attempt.run(point, print)
+    return found
+
+
+def table_of(point: Point, name: str) -> pd.DataFrame:
+    return pd.read_csv(point.folder / f"{name}.csv")
+
+
+def test_example_is_the_point_nearest_to_the_papers(points: list[Point]) -> None:
+    tables = example_tables(points)
+    (example,) = (p for p in points if p.settings.grid.shape == (24, 12) and p.settings.dt == 0.25
+                  and p.settings.seed == 0)  # fmt: skip
+    ranking = tables["example_ranking"]
+    assert set(ranking["point"]) == {example.identity}
+    own = table_of(example, "hypotheses")
+    pd.testing.assert_frame_equal(ranking[list(own.columns)], own)
+    phi = table_of(example, "probabilities")
+    np.testing.assert_array_equal(ranking["unconstrained"], phi["unconstrained"])
+    assert set(ranking["trial"]) == set(phi["trial"])
+    visits = table_of(example, "sampled")
+    visits = visits[visits["trial"] == phi["trial"].iloc[0]]
+    assert tables["example_cells"]["cell"].tolist() == visits["cell"].tolist()
+    assert set(tables["example_moves"]["cell"]) == set(visits["cell"])
+    paths, shown = table_of(example, "paths"), tables["example_paths"]
+    ends = [(path["time"].min(), path["time"].max()) for _, path in paths.groupby("demonstration")]
+    assert ends == [(p["time"].min(), p["time"].max()) for _, p in shown.groupby("demonstration")]
+    assert len(shown) < 0.6 * len(paths)
+    every = paths.merge(shown, on=["demonstration", "time"], suffixes=("", "_shown"))
+    assert len(every) == len(shown)
+    np.testing.assert_allclose(every["position"], every["position_shown"], atol=5.1e-5)
+
+
+def test_cells_and_moves_have_their_corners(points: list[Point]) -> None:
+    tables = example_tables(points)
+    space = points[0].settings.model.space
+    cells = tables["example_cells"]
+    grid = Grid(space, (24, 12))
+    sides = [[f"{side}_{name}" for name in space.names] for side in ("lower", "upper")]
+    centres = (cells[sides[0]].to_numpy() + cells[sides[1]].to_numpy()) / 2
+    np.testing.assert_array_equal(grid.index(centres), cells["cell"])
+    moves = tables["example_moves"]
+    sides = [[f"successor_{name}" for name in names] for names in sides]
+    centres = (moves[sides[0]].to_numpy() + moves[sides[1]].to_numpy()) / 2
+    np.testing.assert_array_equal(grid.index(centres), moves["successor"])
+
+
+def test_compared_trial_is_feasible_in_all_grids_and_passes_nearest(points: list[Point]) -> None:
+    tables = example_tables(points)
+    visits = tables["compared_cells"]
+    alike = [point for point in points if point.identity in set(visits["point"])]
+    assert [point.settings.grid.shape for point in alike] == [SHAPES[0], SHAPES[2]]
+    assert {point.settings.seed for point in alike} == {0}
+    assert visits["cells"].unique().tolist() == [math.prod(p.settings.grid.shape) for p in alike]
+    feasible = set.intersection(
+        *(set(t["trial"][t["feasible"]]) for t in (table_of(p, "trials") for p in alike))
+    )
+    (trial,) = visits["trial"].unique()
+    assert trial in feasible
+    paths = table_of(alike[0], "paths")
+    # The wall is a band of positions: how far a path stays away from its nearer side.
+    gaps = {
+        number: np.maximum(0.6 - path["position"], path["position"] - 1.2).min()
+        for number, path in paths.groupby("demonstration")
+        if number in feasible
+    }
+    assert len(gaps) > 1
+    assert min(gaps, key=lambda number: gaps[number]) == trial
+    assert set(tables["compared_paths"]["demonstration"]) == {trial}
+    violations = tables["compared_violations"]
+    for point in alike:
+        own = table_of(point, "violations")
+        shown = violations[violations["cells"] == math.prod(point.settings.grid.shape)]
+        columns = ["trial", "source", "hypothesis"]
+        expected = own[own["trial"] == trial][columns].to_numpy().tolist()
+        assert expected
+        assert shown[columns].to_numpy().tolist() == expected
+
+
+def test_time_step_is_one_at_which_nearly_all_can_be_followed(
+    points: list[Point], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def dts() -> set[float]:
+        return set(example_tables(points)["compared_cells"]["dt"])
+
+    counts = {
+        dt: min(
+            int(table_of(p, "trials")["feasible"].sum())
+            for p in points
+            if p.settings.dt == dt and p.settings.grid.shape != SHAPES[1]
+        )
+        for dt in (0.25, 0.5)
+    }
+    assert counts[0.25] < counts[0.5]
+    assert dts() == {0.5}
+    monkeypatch.setattr(examples, "_ENOUGH", 0.0)
+    assert dts() == {0.25}
+
+
+def test_order_of_points_does_not_matter_and_truths_stand_apart(points: list[Point]) -> None:
+    one, two = example_tables(points), example_tables(points[::-1])
+    for name, table in one.items():
+        pd.testing.assert_frame_equal(table, two[name])
