@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from experiments.settings import (
+    NO_TRUTH,
     ModelSettings,
     RecordedSettings,
     Region,
@@ -40,7 +41,7 @@ _POSITIVE = (
     "demonstrations.hold",
     "recorded_dt",
 )
-_NOT_NEGATIVE = ("seed", "safety.margin", "safety.width")
+_NOT_NEGATIVE = ("seed", "safety.margin", "safety.width", "truth.cell")
 _AT_LEAST_ONE = (
     "rollouts",
     "transition.samples",
@@ -151,12 +152,25 @@ def shape_problems(settings: ModelSettings) -> Iterator[str]:
     ):
         if shape is not None:
             yield from _length_problems(key, shape, space)
+    yield from _offset_problems(settings.grid.offset, space)
     if not isinstance(settings.actions, int) and len(settings.actions) != controls:
         yield f"actions: {list(settings.actions)} must be one number, or a list of {controls}"
     for i, region in enumerate(settings.hypotheses.boxes):
         yield from _region_problems(f"hypotheses.boxes[{i}]", region, space)
     if settings.hypotheses.shape is None and not settings.hypotheses.boxes:
         yield "hypotheses: no shape and no boxes; give a shape, for a grid of cells, or boxes"
+
+
+def _offset_problems(offset: tuple[float, ...] | None, space: StateSpace) -> Iterator[str]:
+    """Cells can be shifted in periodic dimensions only, by less than a cell."""
+    if offset is None:
+        return
+    yield from _length_problems("grid.offset", offset, space)
+    for share, periodic, name in zip(offset, space.periodic, space.names, strict=False):
+        if not 0 <= share < 1:
+            yield f"grid.offset: {list(offset)} must be shares of a cell, from 0 to below 1"
+        elif share and not periodic:
+            yield f"grid.offset: {list(offset)} shifts {name}, which has ends; give it 0"
 
 
 def truth_shape_problems(settings: Settings) -> Iterator[str]:
@@ -166,8 +180,17 @@ def truth_shape_problems(settings: Settings) -> Iterator[str]:
     yield from _region_problems("tasks", settings.tasks, space)
     for i, region in enumerate(settings.truth.boxes):
         yield from _region_problems(f"truth.boxes[{i}]", region, space)
-    if not settings.truth.boxes:
-        yield "truth.boxes: [] is empty; give at least one box, with lower and upper"
+    truth = settings.truth
+    nothing = not truth.boxes and truth.cell is None
+    if nothing and truth.name != NO_TRUTH:
+        yield (
+            "truth.boxes: [] is empty; give at least one box, with lower and upper, or a cell, or "
+            f"choose truth={NO_TRUTH}"
+        )
+    if truth.name == NO_TRUTH and not nothing:
+        yield f"truth.name: {NO_TRUTH} means that nothing is forbidden; take another name"
+    if truth.cell is not None and truth.boxes:
+        yield f"truth.cell: {truth.cell} and {len(truth.boxes)} boxes are given; keep one of them"
 
 
 def task_problems(settings: RecordedSettings) -> Iterator[str]:
@@ -229,9 +252,17 @@ def size_problems(settings: ModelSettings) -> Iterator[str]:
 
 def truth_problems(settings: Settings) -> Iterator[str]:
     """A value grid that is too large, and a truth that no hypothesis stands for."""
+    count = len(settings.candidates)
+    if settings.truth.cell is not None and settings.truth.cell >= count:
+        yield (
+            f"truth.cell: {settings.truth.cell} is not the number of a hypothesis; there are "
+            f"{count}, from 0 to {count - 1}"
+        )
+        return
     if math.prod(settings.safety.shape) > _MOST_ENTRIES:
         yield f"safety.shape: {list(settings.safety.shape)} makes too many values; use fewer"
-    if not np.any(settings.candidates.inside(settings.constraint)):
+    constraint = settings.constraint
+    if len(constraint) and not np.any(settings.candidates.inside(constraint)):
         yield (
             f"truth: {settings.truth.name} covers no hypothesis entirely, so none can be ranked as "
             "the truth; choose boxes that hold a whole cell of hypotheses.shape, or refine that"

@@ -68,6 +68,9 @@ def measure_lines(summary: pd.Series, ranks: pd.DataFrame, top: int) -> Iterator
         f"{summary['violation_distance']:.2f} each (floor {summary['violation_floor']:.2f}), "
         f"{summary['violation_distance_pooled']:.2f} pooled"
     )
+    if ranks["rank"].isna().all():
+        yield "                nothing is forbidden, so there is no truth to rank"
+        return
     sizes = ranks["demonstrations"]
     for size in sorted({1, 5, 9, sizes.max()}.intersection(sizes)):
         rows = ranks[sizes == size]

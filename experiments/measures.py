@@ -27,12 +27,13 @@ _PATH_EVERY = 5  # samples of a path between those that its table keeps
 def rank_table(
     settings: Settings, phi: Floats, violated: Bools, reachable: Bools, rng: np.random.Generator
 ) -> pd.DataFrame:
-    """A row a random subset of the demonstrations: the rank of the truth after them."""
+    """A row a random subset of the demonstrations: the rank of the truth after them, if any."""
     truth = settings.candidates.inside(settings.constraint)
     wanted = settings.ranks
     rows = []
     for subsets in random_subsets(len(phi), wanted.demonstrations, wanted.subsets, rng):
         rank = truth_ranks(phi, violated, truth, subsets)
+        in_top = (rank <= wanted.top).astype(int) if truth.any() else np.nan
         rows.append(
             pd.DataFrame(
                 {
@@ -40,7 +41,7 @@ def rank_table(
                     "subset": np.arange(len(subsets)),
                     "reachable": np.sum(reachable[subsets], axis=1),
                     "rank": rank,
-                    f"share_top_{wanted.top}": (rank <= wanted.top).astype(int),
+                    f"share_top_{wanted.top}": in_top,
                 }
             )
         )

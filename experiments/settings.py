@@ -17,6 +17,8 @@ from mlci.grids import Grid
 from mlci.spaces import Box, StateSpace
 from mlci.systems import System
 
+NO_TRUTH = "none"  # the truth's name where nothing is forbidden
+
 
 @dataclass(frozen=True)
 class Region:
@@ -47,17 +49,30 @@ class SystemSettings:
 
 @dataclass(frozen=True)
 class TruthSettings:
-    """The true constraint: the union of its boxes."""
+    """The true constraint: the union of its boxes, one of the hypotheses, or nothing at all.
+
+    Attributes:
+        name: what tables call it; NO_TRUTH for nothing.
+        boxes: its boxes; none where a hypothesis is the truth, or nothing is.
+        cell: the hypothesis that is the truth, by its number; None for boxes.
+    """
 
     name: str
     boxes: tuple[Region, ...]
+    cell: int | None
+
+    @property
+    def label(self) -> str:
+        """The name, with the number of the hypothesis."""
+        return self.name if self.cell is None else f"{self.name}_{self.cell}"
 
 
 @dataclass(frozen=True)
 class GridSettings:
-    """The cells of the tabular model."""
+    """The cells of the tabular model, and how far they are shifted, as shares of a cell."""
 
     shape: tuple[int, ...]
+    offset: tuple[float, ...] | None
 
 
 @dataclass(frozen=True)
@@ -95,6 +110,8 @@ class DemonstrationSettings:
     iterations: int
     goal_weight: float
     hold: float
+    clip: bool
+    wind: bool
 
 
 @dataclass(frozen=True)
@@ -143,7 +160,7 @@ class ModelSettings:
     @cached_property
     def cells(self) -> Grid:
         """The grid of the tabular model."""
-        return Grid(self.model.space, self.grid.shape)
+        return Grid(self.model.space, self.grid.shape, self.grid.offset or ())
 
     @cached_property
     def candidates(self) -> ConstraintSet:
@@ -173,15 +190,18 @@ class Settings(ModelSettings):
 
     @cached_property
     def constraint(self) -> ConstraintSet:
-        """The true constraint."""
-        return ConstraintSet.from_boxes(self.model.space, [box.box() for box in self.truth.boxes])
+        """The true constraint; a set of no regions where there is none."""
+        boxes = [region.box() for region in self.truth.boxes]
+        if self.truth.cell is not None:
+            boxes = [self.candidates.box(self.truth.cell)]
+        return ConstraintSet.from_boxes(self.model.space, boxes)
 
     @property
     def columns(self) -> dict[str, str | int | float]:
         """The values that open every row of this point's tables."""
         actions = self.actions
         return {
-            "truth": self.truth.name,
+            "truth": self.truth.label,
             "cells": math.prod(self.grid.shape),
             "actions": actions if isinstance(actions, int) else "x".join(map(str, actions)),
             "dt": self.dt,

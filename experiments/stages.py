@@ -78,7 +78,7 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
         found = solve(settings.model, grid, settings.constraint)
         return {"values": found.values, "gradients": found.gradients}
 
-    depends = (settings.system, settings.truth.boxes, settings.safety.shape)
+    depends = (settings.system, _corners(settings.constraint), settings.safety.shape)
     stored = store.get("safe_set", depends, [mlci.reachability, _system_module(settings)], compute)
     return SafeSet(grid, stored["values"], stored["gradients"]), stored.key
 
@@ -86,10 +86,11 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
 def demonstrations(settings: Settings, store: Store) -> TrialSet:
     """The trials of a truth (8), from the store or computed."""
     system, chosen, safety = settings.model, settings.demonstrations, settings.safety
-    omega, omega_key = safe_set(settings, store)
-    margin = safety.margin
-    if margin is None:
-        margin = border_margin(system, omega, chosen.dt)
+    omega, omega_key, margin, filter_ = None, None, safety.margin, None
+    if len(settings.constraint):  # where nothing is forbidden, everything is safe
+        omega, omega_key = safe_set(settings, store)
+        margin = border_margin(system, omega, chosen.dt) if margin is None else margin
+        filter_ = SafetyFilter(system, omega, chosen.dt, margin, safety.width)
 
     def compute() -> dict[str, np.ndarray]:
         trials = sample_trials(
@@ -100,7 +101,7 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
             seed=settings.seed,
             horizon=settings.horizon,
             dt=chosen.dt,
-            margin=margin,
+            margin=margin or 0.0,
             restarts=chosen.restarts,
             hold=chosen.hold,
         )
@@ -108,11 +109,13 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
             system,
             trials,
             settings.constraint,
-            SafetyFilter(system, omega, chosen.dt, margin, safety.width),
+            filter_,
             dt=chosen.dt,
             goal_weight=chosen.goal_weight,
             iterations=chosen.iterations,
             goal_tolerance=chosen.goal_tolerance,
+            wind=chosen.wind,
+            limit=system.control_box if chosen.clip else None,
         )
         shown = [attempt.demonstration for attempt in attempts]
         return {
@@ -179,11 +182,16 @@ def _discretized(
         settings.dt,
         samples,
         settings.temperature,
-        # Infinite sides are no JSON.
-        [[repr(float(side)) for side in box] for box in np.hstack([regions.lower, regions.upper])],
+        _corners(regions),
     )
     modules = [mlci.mdp, _system_module(settings), sys.modules[__name__]]
     return store.get(stage, depends, modules, compute)
+
+
+def _corners(regions: ConstraintSet) -> list[list[str]]:
+    """The corners of regions, for a key: infinite sides are no JSON."""
+    sides = np.hstack([regions.lower, regions.upper])
+    return [[repr(float(side)) for side in box] for box in sides]
 
 
 def _task_box(settings: Settings) -> Box:

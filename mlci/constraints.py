@@ -21,7 +21,7 @@ _CHORDS_AT_ONCE = 1 << 13  # C x 8 KiB of a crossing test stay in the second lev
 
 @dataclass(frozen=True, eq=False)
 class ConstraintSet:
-    """C boxes in a state space; they may overlap, and need not cover it.
+    """C boxes in a state space; they may overlap, need not cover it, and there may be none.
 
     Attributes:
         space: the state space.
@@ -39,10 +39,9 @@ class ConstraintSet:
     def __post_init__(self) -> None:
         lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
         n = self.space.dimension
-        if lower.ndim != 2 or lower.shape != upper.shape or lower.shape[1] != n or not len(lower):
+        if lower.ndim != 2 or lower.shape != upper.shape or lower.shape[1] != n:
             raise ValueError(
-                f"regions need corners of shape (C, {n}) with C >= 1, "
-                f"not {lower.shape} and {upper.shape}"
+                f"regions need corners of shape (C, {n}), not {lower.shape} and {upper.shape}"
             )
         bad = ~np.all((lower < upper) & (np.isfinite(lower) == np.isfinite(upper)), axis=1)
         if bad.any():
@@ -60,10 +59,8 @@ class ConstraintSet:
     @classmethod
     def from_boxes(cls, space: StateSpace, boxes: Iterable[Box]) -> ConstraintSet:
         """The regions listed, in their order."""
-        boxes = list(boxes)
-        return cls(
-            space, np.array([box.lower for box in boxes]), np.array([box.upper for box in boxes])
-        )
+        corners = np.array([(box.lower, box.upper) for box in boxes])
+        return cls(space, *np.moveaxis(corners.reshape(-1, 2, space.dimension), 1, 0))
 
     @classmethod
     def from_grid(cls, space: StateSpace, shape: Sequence[int | None]) -> ConstraintSet:
@@ -86,9 +83,13 @@ class ConstraintSet:
         )
 
     def signed_distance(self, states: ArrayLike) -> Floats:
-        """dist_K of the union (...,) at states (..., n): below 0 inside some region."""
+        """dist_K of the union (...,) at states (..., n): below 0 inside some region.
+
+        +inf everywhere if there is no region.
+        """
+        nowhere = np.full(np.shape(states)[:-1], np.inf)
         each = [self.space.signed_distance(states, self.box(i)) for i in range(len(self))]
-        return np.min(each, axis=0)
+        return np.min([nowhere, *each], axis=0)
 
     def inside(self, other: ConstraintSet) -> Bools:
         """(C,) which regions lie entirely in one region of `other` (to 1e-9 of the bounds).
@@ -211,8 +212,8 @@ class ConstraintSet:
             chords_to = self.space.bounds.upper[d] + period / 2
             first = np.where(free, 0.0, np.ceil((chords_from - upper[:, d]) / period))
             last = np.where(free, 0.0, np.floor((chords_to - lower[:, d]) / period))
-            copies = []
-            for turns in np.arange(first.min(), last.max() + 1):
+            copies = [(region[:0], lower[:0], upper[:0])]
+            for turns in np.arange(first.min(initial=0.0), last.max(initial=0.0) + 1):
                 wanted = (first <= turns) & (turns <= last)
                 shift = np.where(np.arange(self.space.dimension) == d, turns * period, 0.0)
                 copies.append((region[wanted], lower[wanted] + shift, upper[wanted] + shift))

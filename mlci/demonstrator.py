@@ -61,7 +61,8 @@ class Attempt:
         demonstration: the path, whether it was kept or not.
         outcome: kept, or why not.
         cost: the optimiser's cost, effort and goal penalty.
-        miss: distance of the last state from the goal, Euclidean in raw units, wrapped.
+        miss: distance of the last state from the goal, Euclidean in raw units; by any winding
+            that the demonstrator may take.
         restart: which first guess led to it.
     """
 
@@ -135,6 +136,8 @@ def demonstrate(
     goal_weight: float = 300.0,
     iterations: int = 10,
     goal_tolerance: float = REACHED,
+    wind: bool = True,
+    limit: Box | None = None,
 ) -> list[Attempt]:
     """Let the demonstrator try every trial: equation (8) from each guess, of which the best counts.
 
@@ -148,6 +151,8 @@ def demonstrate(
         goal_weight: price of the squared terminal error.
         iterations: of the optimiser.
         goal_tolerance: largest distance from the goal that counts as reached, in raw units.
+        wind: whether any number of turns may lead to a goal, see `optimize`.
+        limit: range of the controls, such as the control box; None for no limit.
 
     Returns:
         One attempt a trial, in their order.
@@ -163,6 +168,8 @@ def demonstrate(
         goal_weight=goal_weight,
         iterations=iterations,
         safety_filter=safety_filter,
+        wind=wind,
+        limit=limit,
     )
     entered = np.zeros(len(solution.states), dtype=bool)
     if truth is not None:
@@ -171,7 +178,7 @@ def demonstrate(
     attempts = []
     for number, task in enumerate(tasks):
         own = np.arange(number * restarts, (number + 1) * restarts)
-        misses = np.linalg.norm(system.space.excess(solution.states[own, -1], task.goal), axis=-1)
+        misses = np.linalg.norm(solution.excess[own], axis=-1)
         failures = np.array([entered[own], left[own], ~(misses <= goal_tolerance)])
         best = int(np.lexsort([solution.cost[own], failures.any(axis=0)])[0])
         outcome = list(Outcome)[int(np.argmax([*failures[:, best], True]))]

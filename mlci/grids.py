@@ -18,13 +18,16 @@ class Grid:
     Attributes:
         space: the state space that is covered.
         shape: (n,) number of cells in each dimension.
+        offset: (n,) how far the cells are shifted, as a share of a cell in [0, 1); 0 where the
+            space is not periodic. The last cell of a shifted dimension goes across the seam.
 
     Raises:
-        ValueError: a shape of the wrong length or with an entry below 1.
+        ValueError: a shape of the wrong length or with an entry below 1, or an offset out of range.
     """
 
     space: StateSpace
     shape: tuple[int, ...]
+    offset: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         shape = tuple(int(count) for count in self.shape)
@@ -33,7 +36,17 @@ class Grid:
                 f"a grid over {self.space.names} needs {self.space.dimension} counts of at "
                 f"least 1, not {list(self.shape)}"
             )
+        offset = tuple(float(share) for share in self.offset) or (0.0,) * len(shape)
+        if len(offset) != len(shape) or not all(
+            0 <= share < (1 if periodic else 1e-300)
+            for share, periodic in zip(offset, self.space.periodic, strict=False)
+        ):
+            raise ValueError(
+                f"a grid over {self.space.names} needs {len(shape)} offsets from 0 to below 1, and "
+                f"0 in a dimension that does not wrap, not {list(offset)}"
+            )
         object.__setattr__(self, "shape", shape)
+        object.__setattr__(self, "offset", offset)
 
     @property
     def size(self) -> int:
@@ -46,9 +59,14 @@ class Grid:
         return self.space.bounds.widths / self.shape
 
     @cached_property
+    def _lower(self) -> Floats:
+        """(n,) lower corner of the first cell."""
+        return self.space.bounds.lower + np.array(self.offset) * self.widths
+
+    @cached_property
     def axes(self) -> tuple[Floats, ...]:
-        """Cell centres along each dimension: n arrays of length shape[d]."""
-        lower = self.space.bounds.lower
+        """Cell centres along each dimension: n arrays of length shape[d]; not wrapped."""
+        lower = self._lower
         return tuple(
             lower[d] + (np.arange(count) + 0.5) * self.widths[d]
             for d, count in enumerate(self.shape)
@@ -62,10 +80,7 @@ class Grid:
     @cached_property
     def corners(self) -> tuple[Floats, Floats]:
         """Lower and upper corner (S, n) of every cell; neighbours share theirs to the last bit."""
-        lower, place = (
-            self.space.bounds.lower,
-            np.indices(self.shape).reshape(len(self.shape), -1).T,
-        )
+        lower, place = self._lower, np.indices(self.shape).reshape(len(self.shape), -1).T
         return lower + place * self.widths, lower + (place + 1) * self.widths
 
     def index(self, states: ArrayLike) -> Ints:
@@ -74,7 +89,11 @@ class Grid:
         Cells are half open; the upper bound of the space belongs to the last cell.
         """
         wrapped = self.space.wrap(states)
-        position = np.floor((wrapped - self.space.bounds.lower) / self.widths)
+        position = np.floor((wrapped - self._lower) / self.widths)
+        # What lies before the first cell of a shifted dimension belongs to the last.
+        position = np.where(
+            self.space.periodic & (position < 0), np.array(self.shape) - 1, position
+        )
         position = np.clip(np.nan_to_num(position), 0, np.array(self.shape) - 1).astype(np.int64)
         number = np.ravel_multi_index(tuple(np.moveaxis(position, -1, 0)), self.shape)
         return np.where(self.space.contains(wrapped), number, -1)
@@ -149,7 +168,7 @@ class Grid:
         how far (*batch, n) a state is above the lower centre, in cells.
         """
         outermost, lowest, strides = self._limits
-        position = (np.asarray(states) - self.space.bounds.lower) / self.widths - 0.5
+        position = (np.asarray(states) - self._lower) / self.widths - 0.5
         position = np.minimum(np.maximum(position, outermost[0]), outermost[1])
         low = np.minimum(np.maximum(np.floor(position), lowest[0]), lowest[1])
         ends = np.stack([low, low + 1]).astype(np.int64) % self.shape * strides

@@ -8,19 +8,20 @@ behaviors through online trajectory optimization"). Each member of a batch minim
     sum_k |v_k|^2 dt + goal_weight |excess(x_K)|^2,    x_{k+1} = x_k + dt h(x_k, v_k),
 
 where v_k = filter(x_k, u_k) is the control that a safety filter lets through, u_k is the control
-that is optimised, and `excess` is how far the last state is outside the goal, by the nearest
-winding. Members never influence each other.
+that is optimised, inside a box where there is a limit, and `excess` is how far the last state is
+outside the goal: by the winding of periodic dimensions that is nearest to that state, or to the
+start. Members never influence each other.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from mlci.simulate import euler_step
-from mlci.spaces import Bools, Floats, Ints, StateSpace
+from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.systems import System
 
 _STEP_SIZES: Floats = 0.5 ** np.arange(8.0)
@@ -58,12 +59,14 @@ class Solution:
     Attributes:
         states: (B, K+1, n) path, not wrapped.
         controls: (B, K, m) applied controls, after the filter.
+        excess: (B, n) how far the last state is outside the goal in each dimension, signed.
         costs: (iterations + 1, B) cost after each iteration, the first guess's before it; inf for
             a member whose first guess overflows.
     """
 
     states: Floats
     controls: Floats
+    excess: Floats
     costs: Floats
 
     @property
@@ -83,11 +86,13 @@ class _Problem:
     dt: float
     goal_weight: float
     safety_filter: ControlFilter
+    wind: bool
+    limit: Box | None
 
     def of(self, members: Ints) -> _Problem:
         """The problems of some members only."""
         chosen = self.starts[members], self.goal_lower[members], self.goal_upper[members]
-        return _Problem(self.system, *chosen, self.dt, self.goal_weight, self.safety_filter)
+        return replace(self, starts=chosen[0], goal_lower=chosen[1], goal_upper=chosen[2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +127,8 @@ def optimize(
     iterations: int = 10,
     tolerance: float = 1e-9,
     safety_filter: ControlFilter | None = None,
+    wind: bool = True,
+    limit: Box | None = None,
 ) -> Solution:
     """Solve (8) for every member of a batch, from its own first guess.
 
@@ -137,6 +144,9 @@ def optimize(
         iterations: at most so many.
         tolerance: a member stops when an iteration lowers its cost by a smaller share than this.
         safety_filter: acts inside the rollout and its derivatives in the linearisation.
+        wind: whether any number of turns may lead to the goal; else only the winding of its middle
+            that is nearest to the start, at most half a turn away.
+        limit: range that controls are clipped to, before the filter; None for no limit.
 
     Raises:
         ValueError: shapes that disagree, or a goal side with one infinite end.
@@ -144,7 +154,9 @@ def optimize(
     starts, controls = np.asarray(starts, dtype=float), np.asarray(controls, dtype=float)
     _check(system, starts, goal_lower, goal_upper, controls)
     filter_ = _NoFilter() if safety_filter is None else safety_filter
-    problem = _Problem(system, starts, goal_lower, goal_upper, dt, goal_weight, filter_)
+    problem = _Problem(
+        system, starts, goal_lower, goal_upper, dt, goal_weight, filter_, wind, limit
+    )
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging candidate is not an error
         guess = np.moveaxis(controls, 1, 0)
         zero = np.zeros((len(guess) + 1, *starts.shape))
@@ -167,6 +179,7 @@ def optimize(
     return Solution(
         np.moveaxis(path.states, 0, 1).copy(),
         np.moveaxis(path.applied, 0, 1).copy(),
+        _terminal(problem, path.states[-1])[0],
         np.array(costs),
     )
 
@@ -185,13 +198,17 @@ def _check(system: System, starts: Floats, lower: Floats, upper: Floats, control
         raise ValueError("a goal's side is bounded at both ends or at neither")
 
 
-def _terminal(
-    space: StateSpace, states: Floats, lower: Floats, upper: Floats
-) -> tuple[Floats, Floats]:
-    """StateSpace.excess (..., n) of states for a goal each, and its derivative's diagonal."""
-    bounded = np.isfinite(lower)
-    lower, upper = np.where(bounded, lower, 0.0), np.where(bounded, upper, 0.0)
-    offset = np.where(bounded, space.difference(states, (lower + upper) / 2), 0.0)
+def _terminal(problem: _Problem, states: Floats) -> tuple[Floats, Floats]:
+    """How far last states (..., B, n) are outside their goals, and its derivative's diagonal."""
+    space, bounded = problem.system.space, np.isfinite(problem.goal_lower)
+    lower = np.where(bounded, problem.goal_lower, 0.0)
+    upper = np.where(bounded, problem.goal_upper, 0.0)
+    middle = (lower + upper) / 2
+    if problem.wind:
+        offset = space.difference(states, middle)
+    else:
+        offset = states - (problem.starts + space.difference(middle, problem.starts))
+    offset = np.where(bounded, offset, 0.0)
     excess = np.sign(offset) * np.maximum(np.abs(offset) - (upper - lower) / 2, 0.0)
     return excess, (bounded & ((excess != 0) | (lower == upper))).astype(float)
 
@@ -221,7 +238,7 @@ def _backward(problem: _Problem, path: _Path, damping: Floats) -> tuple[Floats, 
     curvature = 2 * dt * (through.mT @ through)
     slope = 2 * dt * (through.mT @ applied[..., None])[..., 0]
 
-    excess, sides = _terminal(system.space, states[-1], problem.goal_lower, problem.goal_upper)
+    excess, sides = _terminal(problem, states[-1])
     value_x = 2 * problem.goal_weight * sides * excess
     value_xx = 2 * problem.goal_weight * sides[..., None] * np.eye(n)
     shift, gain = np.empty_like(wanted), np.empty((*wanted.shape, n))
@@ -229,9 +246,11 @@ def _backward(problem: _Problem, path: _Path, damping: Floats) -> tuple[Floats, 
         q_z = slope[k] + (step[k].mT @ value_x[..., None])[..., 0]
         q_zz = curvature[k] + step[k].mT @ value_xx @ step[k]
         q_uu, q_ux = q_zz[:, n:, n:], q_zz[:, n:, :n]
-        inverse = _inverses(q_uu, 2 * dt * damping)
-        shift[k] = -(inverse @ q_z[:, n:, None])[..., 0]
-        gain[k] = -(inverse @ q_ux)
+        free = _free(problem.limit, wanted[k], q_z[:, n:])[..., None]
+        held = (1 - free) * np.eye(free.shape[1])
+        inverse = _inverses(free * q_uu * free.mT + held, 2 * dt * damping)
+        shift[k] = -(inverse @ (free * q_z[:, n:, None]))[..., 0]
+        gain[k] = -(inverse @ (free * q_ux))
         # The form that stays exact for gains of a damped Q_uu.
         turn = gain[k].mT
         value_x = q_z[:, :n] + (turn @ (q_uu @ shift[k][..., None] + q_z[:, n:, None]))[..., 0]
@@ -239,6 +258,18 @@ def _backward(problem: _Problem, path: _Path, damping: Floats) -> tuple[Floats, 
         value_xx = q_zz[:, :n, :n] + turn @ (q_uu @ gain[k] + q_ux) + q_ux.mT @ gain[k]
         value_xx = (value_xx + value_xx.mT) / 2
     return shift, gain
+
+
+def _free(limit: Box | None, wanted: Floats, slope: Floats) -> Floats:
+    """(B, m) 0 for a control at an end of its range from which a lower cost would lead outside.
+
+    Such controls stay where they are, and the others take the Newton step without them (Tassa,
+    Mansard and Todorov 2014, "Control-limited differential dynamic programming").
+    """
+    if limit is None:
+        return np.ones(wanted.shape)
+    outward = (wanted <= limit.lower) & (slope > 0) | (wanted >= limit.upper) & (slope < 0)
+    return np.where(outward, 0.0, 1.0)
 
 
 def _inverses(matrices: Floats, ridge: Floats) -> Floats:
@@ -263,9 +294,11 @@ def _roll_out(
     for k in range(len(shift)):
         feedback = (gain[k] @ (states[k] - around.states[k])[..., None])[..., 0]
         wanted[k] = around.wanted[k] + scale * shift[k] + feedback
+        if problem.limit is not None:
+            wanted[k] = np.clip(wanted[k], problem.limit.lower, problem.limit.upper)
         applied[k] = problem.safety_filter.apply(states[k], wanted[k])
         states[k + 1] = euler_step(problem.system, states[k], applied[k], problem.dt)
-    excess, _ = _terminal(problem.system.space, states[-1], problem.goal_lower, problem.goal_upper)
+    excess, _ = _terminal(problem, states[-1])
     effort = np.sum(np.square(applied), axis=(0, -1)) * problem.dt
     cost = effort + problem.goal_weight * np.sum(np.square(excess), axis=-1)
     return _Path(states, wanted, applied, np.where(np.isfinite(cost), cost, np.inf))

@@ -88,8 +88,10 @@ def truth_ranks(phi: ArrayLike, violated: ArrayLike, truth: Bools, subsets: Ints
         subsets: (B, k) indices of demonstrations.
 
     Returns:
-        (B,) ranks from 1; ties share their mean rank.
+        (B,) ranks from 1; ties share their mean rank. NaN if the truth covers no hypothesis.
     """
+    if not np.any(truth):
+        return np.full(len(subsets), np.nan)
     gain = np.sum(log_likelihood_gain(phi)[subsets], axis=1)
     feasible = ~np.any(np.asarray(violated, dtype=bool)[subsets], axis=1)
     return np.asarray(np.min(rank_scores(gain, feasible)[:, truth], axis=1))

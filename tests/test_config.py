@@ -5,6 +5,7 @@ import math
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hydra import compose, initialize_config_dir
 
@@ -139,7 +140,7 @@ WRONG = [
     ("system.speed_limit=fast", "system.speed_limit: 'fast' is not a finite number"),
     ("~system._target_", "system._target_: missing"),
     ("grid=300", "grid: there is no 300; there are 100, 400, 900, 1600"),
-    ("truth=c9", "truth: there is no c9; there are c1, c2, wall"),
+    ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, wall"),
     ("grdi=100", "grdi: unknown key; did you mean grid?"),
     ("dt=[1", "dt=[1: cannot be read as key=value"),
     ("dt", "dt: cannot be read as key=value"),
@@ -174,7 +175,13 @@ WRONG = [
         "grid.shape: [5, 6, 7] must have 2 entries, one each for angle",
     ),
     ("system=double_integrator", "truth.boxes[0]: position from 3.14159 to 3.76991 leaves"),
-    ("truth.boxes=[]", "truth.boxes: [] is empty"),
+    ("truth.boxes=[]", "truth.boxes: [] is empty; give at least one box, with lower and upper, or"),
+    ("truth.name=none", "truth.name: none means that nothing is forbidden; take another name"),
+    ("truth.cell=37", "truth.cell: 37 and 1 boxes are given; keep one of them"),
+    ("truth.cell=-1", "truth.cell: -1 must not be below 0"),
+    ("grid.offset=[0.5]", "grid.offset: [0.5] must have 2 entries, one each for angle"),
+    ("grid.offset=[1,0]", "grid.offset: [1.0, 0.0] must be shares of a cell, from 0 to below 1"),
+    ("grid.offset=[0,0.5]", "grid.offset: [0.0, 0.5] shifts angular_velocity, which has ends"),
     ("truth.boxes=[{lower:[0],upper:[1]}]", "truth.boxes[0].lower: [0.0] must have 2 entries"),
     ("truth.boxes=[{lower:[0,1],upper:[1,0]}]", "angular_velocity goes from 1.0 to 0.0"),
     ("truth.boxes=[{lower:[0,null],upper:[1,0]}]", "angular_velocity has one side only"),
@@ -227,7 +234,7 @@ def test_wrong_value_is_refused(
         (b"boxes: [1\n", "/truth/mine.yaml, line 2: not valid YAML"),
         (b"name: a\nname: b\n", "/truth/mine.yaml, line 2: not valid YAML"),
         (b"name: \xff\n", "/truth/mine.yaml: byte 6 is not UTF-8"),
-        (b"- a\n", "truth: ['a'] is not a group of values"),
+        (b"- a\n", "/truth/mine.yaml: holds a list, not keys with values"),
         (b"", "truth.name: missing"),
         (b"defaults: 3\n", "Invalid defaults list in 'truth/mine'"),
     ],
@@ -243,6 +250,25 @@ def test_broken_file_is_refused(
     (tmp_path / "truth" / "mine.yaml").write_bytes(content)
     said = refusal(["--config-dir", str(tmp_path), "truth=mine"], monkeypatch, capsys)
     assert message in said
+
+
+def test_hypothesis_that_is_the_truth_must_exist(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = refusal(["truth=cell", "truth.cell=100"], monkeypatch, capsys)
+    assert "truth.cell: 100 is not the number of a hypothesis; there are 100, from 0 to 99" in said
+
+
+def test_a_hypothesis_or_nothing_can_be_the_truth() -> None:
+    cell, _ = read_config(composed("truth=cell", "truth.cell=37"))
+    assert cell.columns["truth"] == "cell_37"
+    assert np.flatnonzero(cell.candidates.inside(cell.constraint)).tolist() == [37]
+    assert np.flatnonzero(cell.constraint.inside(cell.candidates)).tolist() == [0]
+    nothing, _ = read_config(composed("truth=none"))
+    assert nothing.columns["truth"] == "none"
+    assert len(nothing.constraint) == 0
+    one, other = identity("truth=cell", "truth.cell=1"), identity("truth=cell", "truth.cell=2")
+    assert one != other
 
 
 def test_all_wrong_points_of_a_sweep_are_reported_at_once(

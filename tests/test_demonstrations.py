@@ -158,6 +158,36 @@ def test_every_reason_is_named_and_the_gravest_wins():
     assert outcome(slow, barred, 0) is Outcome.TRUTH_ENTERED
 
 
+def test_limited_demonstrator_stays_in_the_control_box_and_out_of_the_truth(
+    safe_set, safety_filter
+):
+    trials = draw(safe_set, trials=12, margin=safety_filter.margin, horizon=3.0)
+    relaxed = SafetyFilter(PENDULUM, safe_set, DT, safety_filter.margin, 0.2)
+    for filter_, limit in (
+        (safety_filter, None),
+        (safety_filter, PENDULUM.control_box),
+        (relaxed, PENDULUM.control_box),
+    ):
+        attempts = demonstrate(PENDULUM, trials, TRUTHS, filter_, dt=DT, limit=limit)
+        peak = max(np.max(np.abs(each.demonstration.controls)) for each in attempts)
+        assert peak > 3.0 if limit is None else peak <= 2.0
+        outcomes = [each.outcome for each in attempts]
+        assert Outcome.TRUTH_ENTERED not in outcomes
+        assert outcomes.count(Outcome.KEPT) >= 6
+
+
+def test_demonstrator_that_may_not_wind_goes_at_most_half_a_turn(safe_set):
+    trials = draw(safe_set, trials=20)
+    way = {}
+    for wind in (True, False):
+        attempts = demonstrate(PENDULUM, trials, None, None, dt=DT, wind=wind)
+        paths = [a.demonstration.states[:, 0] for a in attempts if a.outcome is Outcome.KEPT]
+        assert len(paths) >= 15
+        way[wind] = np.array([np.abs(path[-1] - path[0]) for path in paths])
+    assert np.max(way[True]) > np.pi + 0.1
+    assert np.max(way[False]) <= np.pi + 0.05
+
+
 def test_motion_between_samples_counts():
     # From rest under u = 1 for 1 s: x = v^2 / 2, below the chord from (0, 0) to (0.5, 1).
     mass = DoubleIntegrator()

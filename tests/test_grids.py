@@ -154,6 +154,36 @@ def test_slope_is_zero_beyond_the_bounds():
     np.testing.assert_allclose(slope, [[0, 1], [0, 0], [0, 0]], atol=1e-12)
 
 
+@pytest.mark.parametrize(("shape", "share"), [((7,), 0.5), ((6, 5), 0.3), ((4, 5, 3), 0.9)])
+def test_shifted_cells_are_those_of_a_shifted_space(shape, share):
+    plain = grid_of(shape)
+    offset = np.where(plain.space.periodic, share, 0.0)
+    grid, move = Grid(plain.space, shape, tuple(offset)), offset * plain.widths
+    bounds = Box(plain.space.bounds.lower + move, plain.space.bounds.upper + move)
+    moved = Grid(StateSpace(bounds, plain.space.periodic, plain.space.names), shape)
+    states = random_states(grid, 500, beyond=0.3)
+    np.testing.assert_array_equal(grid.index(states), moved.index(states))
+    np.testing.assert_array_equal(grid.index(grid.centers), np.arange(grid.size))
+    np.testing.assert_allclose(grid.centers, moved.centers)
+    np.testing.assert_allclose(grid.corners, moved.corners)
+    np.testing.assert_allclose(grid.points_inside(2), moved.points_inside(2))
+    values = np.random.default_rng(5).normal(size=grid.size)
+    for function in ("interpolate", "slope"):
+        found, expected = (getattr(each, function)(values, states) for each in (grid, moved))
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+    for state in states[:50]:
+        region = Box(state - 0.7, state + 0.7)
+        np.testing.assert_array_equal(grid.cells_in(region), moved.cells_in(region))
+
+
+@pytest.mark.parametrize("offset", [(0.5,), (1.0, 0.0), (-0.1, 0.0), (0.0, 0.5), (np.nan, 0.0)])
+def test_grid_refuses_a_shift_that_leaves_the_space(offset):
+    with pytest.raises(
+        ValueError, match=r"needs 2 offsets from 0 to below 1, and 0 in a dimension"
+    ):
+        Grid(grid_of((6, 5)).space, (6, 5), offset)
+
+
 @pytest.mark.parametrize("shape", [(3,), (3, 4, 5), (3, 0), (3, -1), ()])
 def test_grid_refuses(shape):
     with pytest.raises(ValueError, match=r"over \('a', 'b'\) needs 2 counts of at least 1, not"):

@@ -3,6 +3,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
+from scipy.optimize import brentq, lsq_linear
 
 from mlci.constraints import ConstraintSet
 from mlci.grids import Grid
@@ -65,6 +66,72 @@ def test_one_iteration_solves_a_linear_quadratic_problem():
     guess = rng.normal(size=(steps, 3))
     found = solve_one(system, start, goal, guess, dt, goal_weight=weight, iterations=1)
     np.testing.assert_allclose(found.controls[0], exact, atol=1e-6)
+
+
+def test_limited_controls_solve_a_bounded_least_squares_problem():
+    rng = np.random.default_rng(3)
+    system = Linear(rng.normal(size=(2, 2)), rng.normal(size=(2, 3)))
+    steps, dt, weight = 30, 0.05, 50.0
+    start, goal = rng.normal(size=2), 4 * rng.normal(size=2)
+    basis = np.eye(steps * 3).reshape(-1, steps, 3)
+    free = rollout(system, start, np.zeros((steps, 3)), dt, step=euler_step)[-1]
+    ends = rollout(system, np.tile(start, (steps * 3, 1)), basis, dt, step=euler_step)[:, -1]
+    rows = np.vstack([np.sqrt(dt) * np.eye(steps * 3), np.sqrt(weight) * (ends - free).T])
+    wanted = np.append(np.zeros(steps * 3), np.sqrt(weight) * (goal - free))
+    exact = lsq_linear(rows, wanted, bounds=(-1, 1), tol=1e-12).x.reshape(steps, 3)
+    at_ends = np.abs(exact) > 1 - 1e-6
+    assert 0.1 < np.mean(at_ends) < 0.9
+    guess = rng.uniform(-1, 1, size=(steps, 3))
+    found = solve_one(
+        system,
+        start,
+        goal,
+        guess,
+        dt,
+        goal_weight=weight,
+        iterations=60,
+        limit=system.control_box,
+        tolerance=1e-15,
+    )
+    assert np.max(np.abs(found.controls)) <= 1
+    np.testing.assert_allclose(found.controls[0], exact, atol=1e-4)
+
+
+def test_limited_mass_saturates_as_pontryagin_says():
+    # u = clip(slope (T / 2 - t)) between rest and rest, with the slope that covers the distance.
+    time, limit, distance = (np.arange(250) + 0.5) * DT, 1.0, 1.5
+
+    def covered(slope):
+        controls = np.clip(slope * (1.25 - time), -limit, limit)
+        return np.sum(controls * (2.5 - time)) * DT
+
+    slope = brentq(lambda slope: covered(slope) - distance, 0.1, 100)
+    exact = np.clip(slope * (1.25 - time), -limit, limit)
+    options = {"goal_weight": 1e4, "iterations": 30, "limit": MASS.control_box}
+    found = solve_one(MASS, [0, 0], [distance, 0], np.full((250, 1), 0.3), **options)
+    assert np.mean(np.abs(exact) == limit) > 0.3
+    np.testing.assert_allclose(found.controls[0, :, 0], exact, atol=0.02)
+    assert np.sum(found.controls**2) * DT == pytest.approx(np.sum(exact**2) * DT, rel=2e-3)
+
+
+def test_goal_without_winding_is_the_one_nearest_to_the_start():
+    rng = np.random.default_rng(5)
+    starts = np.stack([rng.uniform(-9, 9, 40), rng.uniform(-1, 1, 40)], axis=1)
+    goals = np.stack([rng.uniform(0, 2 * np.pi, 40), np.zeros(40)], axis=1)
+    guesses = np.repeat(rng.choice([-2.0, 2.0], (40, 1, 1)), 500, axis=1)  # over the top
+    turns = {}
+    for wind in (True, False):
+        found = optimize(PENDULUM, starts, goals, goals, guesses, DT, wind=wind, iterations=20)
+        way = found.states[:, -1, 0] - starts[:, 0]
+        nearest = np.mod(goals[:, 0] - starts[:, 0] + np.pi, 2 * np.pi) - np.pi
+        reached = np.linalg.norm(found.excess, axis=1) < 0.05
+        assert np.mean(reached) > 0.7
+        turns[wind] = np.abs(way - nearest)[reached] / (2 * np.pi)
+        np.testing.assert_allclose(turns[wind], np.round(turns[wind]), atol=0.01)
+        ends = np.sum(found.controls**2, axis=(1, 2)) * DT + 300 * np.sum(found.excess**2, axis=1)
+        np.testing.assert_allclose(found.cost, ends)
+    assert np.max(turns[False]) < 0.01
+    assert np.mean(turns[True] > 0.5) > 0.2
 
 
 def test_swing_costs_what_pontryagin_says():

@@ -59,6 +59,11 @@ def test_random_subsets_are_nested_and_distinct() -> None:
     assert all(len(set(row)) == 8 for row in subsets[-1].tolist())
 
 
+def test_a_truth_that_covers_no_hypothesis_has_no_rank() -> None:
+    ranks = truth_ranks([[0.2, 0.1]], [[False, True]], np.array([False, False]), np.array([[0]]))
+    assert np.isnan(ranks).tolist() == [True]
+
+
 def test_truth_ranks_equal_ranking_each_subset_alone() -> None:
     rng = np.random.default_rng(1)
     phi = rng.random((12, 7)) * (rng.random((12, 7)) < 0.5)

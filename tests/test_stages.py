@@ -5,12 +5,14 @@ import logging
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hydra import compose, initialize_config_dir
 
 from experiments import run, stages
 from experiments.config import read_config
 from experiments.places import CONF
+from experiments.point import run_point
 from experiments.settings import Settings
 from experiments.store import Store
 from experiments.task import plain_tree
@@ -77,6 +79,57 @@ def test_model_is_computed_once_for_all_that_it_does_not_depend_on(
         counted.clear()
         stages.tabular_model(composed("actions=3", change), Store(tmp_path))
         assert counted == [100, 1], change
+
+
+def test_nothing_forbidden_needs_no_safe_set_and_ranks_nothing(tmp_path: Path) -> None:
+    settings = composed("truth=none", "scale=smoke", "ranks.subsets=2", "dt=1.0")
+    lines: list[str] = []
+    tables = run_point(settings, Store(tmp_path), lines.append)
+    assert lines[-1].strip() == "nothing is forbidden, so there is no truth to rank"
+    assert not any("nan" in line for line in lines)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "demonstrations",
+        "mdp",
+        "mdp_truth",
+    ]
+    assert tables["attempts"]["outcome"].isin(["kept", "goal_missed"]).all()
+    assert tables["ranks"][["rank", "share_top_5"]].isna().all(axis=None)
+    assert not tables["hypotheses"]["covered_by_truth"].any()
+    trials = tables["trials"]
+    assert trials["reachable"].equals(trials["feasible"])
+    assert trials["final_state_error"].notna().any()
+
+
+def test_choices_reach_the_demonstrator(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    words = ["safety.shape=[41,41]", "demonstrations.pairs=16", "demonstrations.keep=16"]
+    words += ["demonstrations.dt=0.02", "demonstrations.restarts=1", "horizon=4.0"]
+    plain = stages.demonstrations(composed(*words), store)
+    kept = plain.kept(16)
+    turned = np.abs(plain.states[kept, -1, 0] - plain.states[kept, 0, 0])
+    assert np.max(np.abs(plain.controls[kept])) > 2.5
+    assert np.max(turned) > np.pi + 0.1
+    clipped = stages.demonstrations(composed(*words, "demonstrations.clip=true"), store)
+    assert np.max(np.abs(clipped.controls)) <= 2.0
+    direct = stages.demonstrations(composed(*words, "demonstrations.wind=false"), store)
+    turned = np.abs(direct.states[:, -1, 0] - direct.states[:, 0, 0])[direct.kept(16)]
+    assert np.max(turned) < np.pi + 0.05
+    safe, _ = stages.safe_set(composed(*words), store)
+    careful = stages.demonstrations(composed(*words, "safety.margin=0.6"), store)
+    assert np.min(safe.value(careful.starts)) >= 0.6
+    assert np.min(safe.value(plain.starts)) < 0.6
+
+
+def test_hypothesis_as_truth_gives_what_its_box_gives(tmp_path: Path) -> None:
+    words = ["scale=smoke", "safety.shape=[41,41]", "demonstrations.pairs=4", "ranks.subsets=2"]
+    words += ["demonstrations.keep=4"]
+    box = "[{lower:['6/5 pi',-1.2],upper:['7/5 pi',0]}]"
+    cell = composed("truth=cell", "truth.cell=64", *words)
+    boxes = composed("truth=c1", f"truth.boxes={box}", *words)
+    one, two = (run_point(each, Store(tmp_path), lambda line: None) for each in (cell, boxes))
+    assert np.flatnonzero(one["hypotheses"]["covered_by_truth"]).tolist() == [64]
+    for name, table in one.items():
+        pd.testing.assert_frame_equal(table, two[name])
 
 
 def test_damaged_model_is_computed_again(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
