@@ -9,17 +9,22 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from experiments.schema import plain
 from experiments.settings import (
     NO_TRUTH,
+    AdviceSettings,
+    GridSettings,
     ModelSettings,
     RecordedSettings,
     Region,
     Settings,
     StudySettings,
+    SubjectSettings,
 )
 from mlci.spaces import StateSpace
 
@@ -40,6 +45,7 @@ _POSITIVE = (
     "demonstrations.goal_weight",
     "demonstrations.hold",
     "recorded_dt",
+    "dts",
 )
 _NOT_NEGATIVE = ("seed", "safety.margin", "safety.width", "truth.cell")
 _AT_LEAST_ONE = (
@@ -57,6 +63,10 @@ _AT_LEAST_ONE = (
     "hypotheses.shape",
     "actions",
     "top",
+    "budget",
+    "remedy",
+    "pairs",
+    "grids",
 )
 
 
@@ -87,14 +97,27 @@ def study_problems(study: StudySettings) -> Iterator[str]:
 
 def number_problems(settings: ModelSettings) -> Iterator[str]:
     """What is out of range without looking at the system."""
+    yield from _range_problems(settings)
+    if not 0 < settings.inference.prior < 1:
+        yield f"inference.prior: {settings.inference.prior} must lie between 0 and 1, ends excluded"
+
+
+def advice_number_problems(settings: AdviceSettings) -> Iterator[str]:
+    """What is out of range without looking at the system, where discretisations are compared."""
+    yield from _range_problems(settings)
+    for dt in settings.dts:
+        if dt > 0 and settings.horizon > 0:
+            yield from _division_problems("dts", dt, settings.horizon)
+
+
+def _range_problems(settings: SubjectSettings) -> Iterator[str]:
+    """Single numbers out of range."""
     yield from _limit(settings, _POSITIVE, lambda value: value > 0, "must be above 0")
     yield from _limit(settings, _NOT_NEGATIVE, lambda value: value >= 0, "must not be below 0")
     yield from _limit(settings, _AT_LEAST_ONE, lambda value: value >= 1, "must be at least 1")
     yield from _limit(
         settings, _AT_LEAST_ONE, lambda value: value <= _MOST_COUNT, f"is above {_MOST_COUNT}"
     )
-    if not 0 < settings.inference.prior < 1:
-        yield f"inference.prior: {settings.inference.prior} must lie between 0 and 1, ends excluded"
 
 
 def count_problems(settings: Settings) -> Iterator[str]:
@@ -111,7 +134,7 @@ def count_problems(settings: Settings) -> Iterator[str]:
 
 
 def _limit(
-    settings: ModelSettings, keys: tuple[str, ...], holds: Callable[[Any], bool], rule: str
+    settings: SubjectSettings, keys: tuple[str, ...], holds: Callable[[Any], bool], rule: str
 ) -> Iterator[str]:
     """A message for each key whose value, or an entry of it, breaks a rule."""
     for key in keys:
@@ -121,8 +144,10 @@ def _limit(
         if value == ():
             yield f"{key}: [] is empty; give a number for each dimension"
         entries = value if isinstance(value, tuple) else (value,)
+        if any(isinstance(entry, tuple) for entry in entries):
+            entries = tuple(chain.from_iterable(entries))
         if not all(entry is None or holds(entry) for entry in entries):
-            yield f"{key}: {list(value) if isinstance(value, tuple) else value} {rule}"
+            yield f"{key}: {plain(value)} {rule}"
 
 
 def _division_problems(key: str, dt: float, horizon: float) -> Iterator[str]:
@@ -145,14 +170,39 @@ def _is_short(value: float) -> bool:
 
 def shape_problems(settings: ModelSettings) -> Iterator[str]:
     """What does not match the system's dimensions and bounds."""
+    yield from _grid_problems(settings.grid, settings.model.space)
+    yield from _subject_problems(settings)
+
+
+def advice_problems(settings: AdviceSettings) -> Iterator[str]:
+    """What does not match the system's dimensions and bounds, or the budget."""
+    space = settings.model.space
+    before = [
+        *_grid_problems(settings.grid, space),
+        *(
+            message
+            for i, shape in enumerate(settings.grids or ())
+            for message in _length_problems(f"grids[{i}]", shape, space)
+        ),
+        *_subject_problems(settings),
+        *_region_problems("tasks", settings.tasks, space, point=True),
+    ]
+    yield from before
+    if not before and not settings.grids_to_try:
+        yield f"budget: {settings.budget} states hold none of the grids; raise it, or set grids"
+
+
+def _grid_problems(grid: GridSettings, space: StateSpace) -> Iterator[str]:
+    """Cells that do not match the state space."""
+    yield from _length_problems("grid.shape", grid.shape, space)
+    yield from _offset_problems(grid.offset, space)
+
+
+def _subject_problems(settings: SubjectSettings) -> Iterator[str]:
+    """Actions and hypotheses that do not match the system."""
     space, controls = settings.model.space, settings.model.control_box.dimension
-    for key, shape in (
-        ("grid.shape", settings.grid.shape),
-        ("hypotheses.shape", settings.hypotheses.shape),
-    ):
-        if shape is not None:
-            yield from _length_problems(key, shape, space)
-    yield from _offset_problems(settings.grid.offset, space)
+    if settings.hypotheses.shape is not None:
+        yield from _length_problems("hypotheses.shape", settings.hypotheses.shape, space)
     if not isinstance(settings.actions, int) and len(settings.actions) != controls:
         yield f"actions: {list(settings.actions)} must be one number, or a list of {controls}"
     for i, region in enumerate(settings.hypotheses.boxes):

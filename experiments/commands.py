@@ -20,6 +20,11 @@ def infer() -> int:
     return _start("experiments.infer")
 
 
+def advise() -> int:
+    """`mlci-advise`: experiments/advise.py."""
+    return _start("experiments.advise")
+
+
 def results() -> int:
     """`mlci-results`: experiments/results.py."""
     return _start("experiments.results")

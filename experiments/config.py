@@ -14,6 +14,8 @@ from itertools import chain
 from typing import Any
 
 from experiments.checks import (
+    advice_number_problems,
+    advice_problems,
     count_problems,
     number_problems,
     shape_problems,
@@ -25,6 +27,7 @@ from experiments.checks import (
 )
 from experiments.schema import Problems, did_you_mean, field_keys, parse
 from experiments.settings import (
+    AdviceSettings,
     RecordedSettings,
     Settings,
     StudySettings,
@@ -81,6 +84,23 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
         lambda: number_problems(settings),
         lambda: chain(shape_problems(settings), task_problems(settings)),
         lambda: size_problems(settings),
+    ):
+        _check(problems, check)
+    return settings
+
+
+def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
+    """Check a resolved config of experiments/advise.py.
+
+    Raises:
+        ConfigError: listing every problem found.
+    """
+    problems = Problems()
+    known = {key: tree[key] for key in tree if key != "safety"}  # how to make demonstrations
+    settings = parse(AdviceSettings, known, "", problems, {SystemSettings: _parse_system})
+    for check in (
+        lambda: advice_number_problems(settings),
+        lambda: advice_problems(settings),
     ):
         _check(problems, check)
     return settings

@@ -10,29 +10,24 @@ if __name__ == "__main__":  # before all that takes time to import
     sys.exit(commands.infer())
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import hydra
 import numpy as np
 import pandas as pd
-from omegaconf import DictConfig
 
 from experiments.config import ConfigError, read_recorded_config
 from experiments.console import diagnosis_lines, ranking_lines
-from experiments.errors import explain
+from experiments.foreground import run_command
 from experiments.measures import dimension_table, ranking_table
-from experiments.places import CONF
-from experiments.planner import quote_options
-from experiments.run import DONE, FAILED, REFUSED, STOPPED, VERSION_BASE
+from experiments.run import DONE, FAILED
 from experiments.schema import plain
 from experiments.settings import RecordedSettings
 from experiments.store import canonical_json, digest, replace_file
 from experiments.surroundings import surroundings
 from experiments.tables import csv_bytes
-from experiments.task import plain_tree, results_folder
+from experiments.task import results_folder
 from mlci.demonstrations import Demonstration
 from mlci.maxent import expected_violations
 from mlci.mdp import action_grid, discretize
@@ -52,27 +47,7 @@ def main() -> int:
         0 if every file was used, 1 if some could not be, 2 if nothing was done: the config is
         wrong, or no file could be used; 130 after Ctrl-C.
     """
-    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises its errors, and they are worded here
-    sys.argv[1:] = map(quote_options, sys.argv[1:])
-    try:
-        hydra.main(config_path=str(CONF), config_name="infer", **VERSION_BASE)(_task)()
-    except KeyboardInterrupt:
-        return STOPPED
-    except Exception as error:
-        print(explain(error), file=sys.stderr)
-        return REFUSED
-    return DONE
-
-
-def _task(config: DictConfig) -> None:
-    """The inference, outside Hydra's own handling of errors."""
-    try:
-        status = infer(read_recorded_config(plain_tree(config)))
-    except ConfigError as error:
-        print(error, file=sys.stderr)
-        raise SystemExit(REFUSED) from None
-    if status != DONE:
-        raise SystemExit(status)
+    return run_command("infer", lambda tree: infer(read_recorded_config(tree)))
 
 
 def infer(settings: RecordedSettings) -> int:

@@ -140,27 +140,17 @@ class RankSettings:
 
 
 @dataclass(frozen=True)
-class ModelSettings:
-    """The tabular model of a system and the hypotheses about it."""
+class SubjectSettings:
+    """A system, what it can do, and the hypotheses about it."""
 
     system: SystemSettings
-    grid: GridSettings
-    dt: float
     actions: int | tuple[int, ...]
-    transition: TransitionSettings
-    temperature: float
     hypotheses: HypothesesSettings
-    inference: InferenceSettings
 
     @cached_property
     def model(self) -> System:
         """The system, built."""
         return self.system.build()
-
-    @cached_property
-    def cells(self) -> Grid:
-        """The grid of the tabular model."""
-        return Grid(self.model.space, self.grid.shape, self.grid.offset or ())
 
     @cached_property
     def candidates(self) -> ConstraintSet:
@@ -173,6 +163,22 @@ class ModelSettings:
         if isinstance(self.actions, int):
             return (self.actions,) * self.model.control_box.dimension
         return self.actions
+
+
+@dataclass(frozen=True)
+class ModelSettings(SubjectSettings):
+    """The tabular model of a system and the hypotheses about it."""
+
+    grid: GridSettings
+    dt: float
+    transition: TransitionSettings
+    temperature: float
+    inference: InferenceSettings
+
+    @cached_property
+    def cells(self) -> Grid:
+        """The grid of the tabular model."""
+        return Grid(self.model.space, self.grid.shape, self.grid.offset or ())
 
 
 @dataclass(frozen=True)
@@ -221,6 +227,32 @@ class RecordedSettings(ModelSettings):
     round_horizon: bool
     top: int
     results: str | None
+
+
+@dataclass(frozen=True)
+class AdviceSettings(SubjectSettings):
+    """Which discretisations to compare; conf/advise.yaml explains every value."""
+
+    tasks: Region
+    grid: GridSettings
+    grids: tuple[tuple[int, ...], ...] | None
+    dts: tuple[float, ...]
+    budget: int
+    remedy: int
+    horizon: float
+    pairs: int
+    seed: int
+
+    @property
+    def grids_to_try(self) -> list[Grid]:
+        """The grids within the budget, small ones first."""
+        shapes = self.grids
+        if shapes is None:
+            scaled = [[round(m * count) for count in self.grid.shape] for m in (0.5, 1, 1.5, 2)]
+            shapes = tuple(tuple(max(1, count) for count in shape) for shape in scaled)
+        shift = self.grid.offset or ()
+        grids = [Grid(self.model.space, shape, shift) for shape in dict.fromkeys(shapes)]
+        return sorted((g for g in grids if g.size <= self.budget), key=lambda grid: grid.size)
 
 
 @dataclass(frozen=True)

@@ -126,6 +126,9 @@ def test_concerns_name_the_trouble_and_the_remedy() -> None:
     assert "100% of the cells no action changes the angular velocity cell" in frozen[0]
     assert "18 of 22 goals cannot be reached" in frozen[1]
     assert "a longer time step, more cells" in frozen[2]
+    lost = Diagnosis(0.0, 0.0, 19.0, (0.0, 0.0)).concerns(names, 13, 65)
+    assert "13 of 65 goals cannot be reached" in lost[0]
+    assert "more actions, a shorter step, or start points averaged" in lost[1]
     leaving = Diagnosis(0.0, 0.8, 9.0, (0.0, 0.0)).concerns(names, 0, 20)
     assert len(leaving) == 1
     assert "widen its bounds" in leaving[0]

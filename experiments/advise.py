@@ -1,0 +1,290 @@
+"""Compare discretisations of a system, and recommend one: python experiments/advise.py"""
+
+from __future__ import annotations
+
+import sys
+
+if __name__ == "__main__":  # before all that takes time to import
+    from experiments import commands
+
+    sys.exit(commands.advise())
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from tqdm import tqdm
+
+from experiments.config import ConfigError, read_advice_config
+from experiments.console import table_lines, words
+from experiments.foreground import run_command
+from experiments.run import DONE, FAILED
+from experiments.settings import AdviceSettings
+from mlci.demonstrations import Task
+from mlci.demonstrator import Outcome, demonstrate, sample_trials
+from mlci.grids import Grid
+from mlci.maxent import log_partition, reachable, violation_probabilities
+from mlci.mdp import action_grid, discretize
+from mlci.metrics import MOST_UNREACHABLE, Diagnosis, diagnose
+from mlci.simulate import step_count
+from mlci.spaces import Bools, Box, Floats
+
+_SAMPLES = 100  # of the paths that show which tasks can be done
+# A remedy that takes more moves is not tried: some 30 s and 1 GB.
+_MOST_MOVES = 4_000_000
+# A step that crosses fewer cells loses too much by starting anew from a cell's centre, up to half
+# a cell away. On the pendulum the final-state error falls by a third from 1 cell a step to 2.
+_CELLS_A_STEP = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A discretisation that was tried.
+
+    Attributes:
+        grid: its cells.
+        dt: time step [s].
+        samples: start points of a cell, along each dimension.
+        diagnosis: how it moves.
+        reached: (P,) which tasks' goals the tabular agent can reach.
+        coarse: whether its cells are wider than half a hypothesis.
+        discretize_s: processor time that it took to form [s].
+        task_s: processor time that the inference of one task takes [s].
+    """
+
+    grid: Grid
+    dt: float
+    samples: int
+    diagnosis: Diagnosis
+    reached: Bools
+    coarse: bool
+    discretize_s: float
+    task_s: float
+
+    @property
+    def moves(self) -> int:
+        """Start points times cells, to which its cost is proportional."""
+        return self.grid.size * self.samples ** len(self.grid.shape)
+
+    @property
+    def shape(self) -> str:
+        """Its cells along each dimension, in words."""
+        return "x".join(map(str, self.grid.shape))
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the tabular agent reaches the goals."""
+        return bool(np.mean(~self.reached) <= MOST_UNREACHABLE)
+
+    @property
+    def concerns(self) -> list[str]:
+        """What is wrong with it."""
+        unreachable = int(np.sum(~self.reached))
+        return self.diagnosis.concerns(self.grid.space.names, unreachable, len(self.reached))
+
+
+def main() -> int:
+    """Run the command line.
+
+    Returns:
+        0 if a discretisation is recommended, 1 if none is, 2 if the config is wrong, 130 after
+        Ctrl-C.
+    """
+    return run_command("advise", lambda tree: advise(read_advice_config(tree), print))
+
+
+def advise(settings: AdviceSettings, log: Callable[[str], None]) -> int:
+    """Try the discretisations, print what was found and recommend one; returns the exit status."""
+    tasks = _tasks(settings)
+    log(
+        f"tasks           {len(tasks)} of {settings.pairs} that were drawn, {settings.horizon:g} s "
+        "each: those whose cheapest path keeps within the\n"
+        "                ranges of states and controls, so that a good tabular agent can do them"
+    )
+    candidates = list(_try_all(settings, tasks))
+    for line in table_lines([_HEAD, *(_row(each) for each in candidates)]):
+        log(line)
+    log(
+        "goals: share of the tasks' goals that the tabular agent reaches; frozen: largest share of "
+        "cells whose number in a dimension no action changes;\ncells/step: crossed on average; "
+        "leave: share of the moves that leave the state space; form, task: processor time to form "
+        "the model and to infer from a task"
+    )
+    for candidate in candidates:
+        for number, concern in enumerate(candidate.concerns):
+            log(f"{'' if number else _name(candidate):24}{concern}")
+    chosen, reasons = recommend(candidates)
+    if chosen is None:
+        log("recommended     none: raise budget, add larger dts or grids, or try another remedy")
+        return FAILED
+    shape = ",".join(map(str, chosen.grid.shape))
+    log(
+        f"recommended     grid.shape=[{shape}] dt={chosen.dt:g} transition.samples={chosen.samples}"
+    )
+    for reason in reasons:
+        log(f"                {reason}")
+    return DONE
+
+
+def recommend(candidates: Sequence[Candidate]) -> tuple[Candidate | None, list[str]]:
+    """The cheapest discretisation without a fault, and why.
+
+    Each rule keeps those that meet it, unless none does: goals can be reached; the diagnosis has
+    no other concern; no cell is wider than half a hypothesis, so that a cell seldom stands for
+    two; a step crosses at least two cells; the fewest moves; the shortest time step.
+    """
+    left = [each for each in candidates if each.accepted]
+    if not left:
+        return None, []
+    reasons = ["the tabular agent reaches the goals"]
+    for holds, reason, otherwise in (
+        (
+            lambda each: not each.concerns,
+            "the diagnosis finds nothing wrong",
+            "every one that reaches them has a concern: see above",
+        ),
+        (
+            lambda each: not each.coarse,
+            "its cells are at most half as wide as the hypotheses",
+            "its cells are wider than half a hypothesis: a larger budget would rank more sharply",
+        ),
+        (
+            lambda each: each.diagnosis.cells_crossed >= _CELLS_A_STEP,
+            f"a step crosses {_CELLS_A_STEP:g} cells or more, so that rounding to cells matters "
+            "little",
+            f"a step crosses fewer than {_CELLS_A_STEP:g} cells: rounding to cells is felt",
+        ),
+    ):
+        kept = [each for each in left if holds(each)]
+        reasons.append(reason if kept else otherwise)
+        left = kept or left
+    chosen = min(left, key=lambda each: (each.moves, each.dt))
+    reasons.append("of all such, the fewest cells, and then the shortest time step")
+    return chosen, reasons
+
+
+def _tasks(settings: AdviceSettings) -> list[Task]:
+    """Tasks from the task box that can be done: whether a grid can do them is then its merit.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    system, limits = settings.model, settings.model.control_box
+    box, bounds = settings.tasks.box(), system.space.bounds
+    drawn = sample_trials(
+        system,
+        None,
+        Box(
+            np.where(np.isfinite(box.lower), box.lower, bounds.lower),
+            np.where(np.isfinite(box.upper), box.upper, bounds.upper),
+        ),
+        trials=settings.pairs,
+        seed=settings.seed,
+        horizon=settings.horizon,
+        dt=settings.horizon / _SAMPLES,
+    )
+    done = [
+        attempt.demonstration.task
+        for attempt in demonstrate(system, drawn, None, None, dt=settings.horizon / _SAMPLES)
+        if attempt.outcome is Outcome.KEPT
+        and attempt.demonstration.controls is not None
+        and np.all(limits.contains(attempt.demonstration.controls))
+    ]
+    if not done:
+        raise ConfigError(
+            f"tasks: none of the {settings.pairs} that were drawn can be done in "
+            f"{settings.horizon:g} s within the ranges of states and controls; narrow tasks, or "
+            "raise pairs or horizon"
+        )
+    return done
+
+
+def _try_all(settings: AdviceSettings, tasks: Sequence[Task]) -> Iterator[Candidate]:
+    """Every grid and time step; where the centres of the cells fail, with the remedy as well."""
+    todo = [(grid, dt, 1) for grid in settings.grids_to_try for dt in settings.dts]
+    with tqdm(total=len(todo), unit="model", leave=False, disable=None) as bar:
+        while todo:
+            grid, dt, samples = todo.pop(0)
+            bar.set_postfix_str(f"{grid.size} cells, dt {dt:g} s, samples {samples}")
+            candidate = _try(settings, grid, dt, samples, tasks)
+            yield candidate
+            bar.update()
+            moves = grid.size * len(_actions(settings)) * settings.remedy ** len(grid.shape)
+            if not candidate.accepted and samples < settings.remedy and moves <= _MOST_MOVES:
+                todo.insert(0, (grid, dt, settings.remedy))
+                bar.total = len(todo) + bar.n
+
+
+def _try(
+    settings: AdviceSettings, grid: Grid, dt: float, samples: int, tasks: Sequence[Task]
+) -> Candidate:
+    """Form a tabular model and see what it can do."""
+    system, actions = settings.model, _actions(settings)
+    before = time.process_time()
+    mdp = discretize(system, grid, actions, dt, settings.candidates, samples)
+    formed = time.process_time() - before
+    steps = step_count(settings.horizon, dt)
+    begins = [int(grid.index(task.start)) for task in tasks]
+    ends = [grid.cells_in(task.goal) for task in tasks]
+    reached = np.zeros(len(tasks), dtype=bool)
+    for j, (start, goal) in enumerate(zip(begins, ends, strict=True)):
+        reached[j] = np.isin(goal, reachable(mdp, start, steps)[-1]).any()
+    task_s = np.nan
+    if reached.any():
+        first = int(np.argmax(reached))
+        for _ in range(2):  # the second time without what all tasks share
+            before = time.process_time()
+            log_z = log_partition(mdp, begins[first], ends[first], steps)
+            violation_probabilities(mdp, log_z, begins[first])
+            task_s = time.process_time() - before
+    widths = settings.candidates.upper - settings.candidates.lower
+    return Candidate(
+        grid=grid,
+        dt=dt,
+        samples=samples,
+        diagnosis=diagnose(system, grid, actions, dt, mdp),
+        reached=reached,
+        coarse=bool(np.any(grid.widths > widths / 2 * (1 + 1e-9))),
+        discretize_s=formed,
+        task_s=task_s,
+    )
+
+
+def _actions(settings: AdviceSettings) -> Floats:
+    """(A, m) the actions."""
+    return action_grid(settings.model, list(settings.action_counts))
+
+
+_HEAD = (
+    "grid", "states", "dt", "samples", "verdict", "goals", "frozen", "cells/step", "leave",
+    "form [s]", "task [ms]",
+)  # fmt: skip
+
+
+def _row(candidate: Candidate) -> tuple[object, ...]:
+    """A candidate in the table."""
+    found, names = candidate.diagnosis, candidate.grid.space.names
+    worst = int(np.argmax(found.frozen))
+    verdict = "rejected"
+    if candidate.accepted:
+        verdict = "accepted, with a concern" if candidate.concerns else "accepted"
+    return (
+        candidate.shape,
+        candidate.grid.size,
+        candidate.dt,
+        candidate.samples,
+        verdict,
+        f"{np.mean(candidate.reached):.0%}",
+        f"{found.frozen[worst]:.0%} {words(names[worst])}",
+        f"{found.cells_crossed:.1f}",
+        f"{found.leave:.0%}",
+        f"{candidate.discretize_s:.2g}",
+        f"{1e3 * candidate.task_s:.2g}" if candidate.reached.any() else "-",
+    )
+
+
+def _name(candidate: Candidate) -> str:
+    """A candidate in a list of faults."""
+    averaged = f", samples {candidate.samples}" if candidate.samples > 1 else ""
+    return f"{candidate.shape}, {candidate.dt:g} s{averaged}"
