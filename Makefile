@@ -23,7 +23,7 @@ smoke: $(READY) ## run and draw every experiment, tiny, in seconds
 test: $(READY) ## run the tests
 	$(BIN)/python -m pytest
 
-stress: $(READY) ## run what is too long for the tests: kill storms, fuzzing, SLURM, Hydra 1.4
+stress: $(READY) ## run what is too long for the tests: kill storms, fuzzing, SLURM, Dask, Hydra 1.4
 	@set -e; for each in $(wildcard tests/stress/*.py) $(wildcard tests/stress/*.sh); do \
 		echo "=== $$each"; start=$$(date +%s); \
 		case $$each in *.py) $(BIN)/python $$each;; *) $$each;; esac; \

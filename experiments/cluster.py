@@ -7,6 +7,9 @@ was killed.
 
 from __future__ import annotations
 
+import json
+import os
+import sys
 import tempfile
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -17,8 +20,9 @@ from hydra.core.utils import JobReturn, JobStatus
 from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig
 
+from experiments.attempt import bury
 from experiments.config import ConfigError, read_config
-from experiments.launcher import Job, PoolLauncher
+from experiments.launcher import Job, PoolLauncher, end_when
 from experiments.record import Point
 from experiments.task import results_folder, run_task
 
@@ -58,11 +62,11 @@ class ClusterLauncher(PoolLauncher):
             ConfigError: the engine refuses such jobs.
         """
         trees = {tuple(job): self._tree(tuple(job)) for job in job_overrides}
-        points, before = {}, {}
-        for job, tree in trees.items():
-            settings, study = read_config(tree)
-            points[job] = Point(settings, results_folder(study))
-            before[job] = points[job].attempts() if study.sweep.force else 0
+        points = {job: _point(tree) for job, tree in trees.items()}
+        before = {
+            job: point.attempts() if trees[job]["sweep"]["force"] else 0
+            for job, point in points.items()
+        }
         logs = next(iter(points.values())).results / ".jobs"
         logs.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix="", dir=logs))
@@ -75,7 +79,7 @@ class ClusterLauncher(PoolLauncher):
             if point.is_done(before[job]) or point.is_running():  # in another sweep
                 returned.status, returned.return_value = JobStatus.COMPLETED, point.state()
             else:
-                told = f"{where[job]} ended without a result; its log is in {folder}"
+                told = f"{where[job]}: no result; its log is in {folder}"
                 returned.status, returned.return_value = JobStatus.FAILED, RuntimeError(told)
         return returns
 
@@ -92,4 +96,26 @@ def run_share(share: Share, workers: int) -> None:
     """In a job: run points in worker processes; each keeps its own result or failure."""
     pool = PoolLauncher(workers, fail_fast=False)
     pool.task, pool.composed = run_task, share
-    pool.launch(list(share), initial_job_idx=0)
+    points = {job: _point(tree) for job, tree in share.items()}
+    before = {job: point.attempts() for job, point in points.items()}
+    for job, returned in zip(share, pool.launch(list(share), initial_job_idx=0), strict=True):
+        # Nobody but this job knows how a process ended.
+        if returned.status is JobStatus.FAILED and not points[job].is_done(before[job]):
+            bury(points[job], returned._return_value, before[job])
+
+
+def _point(tree: Mapping[str, Any]) -> Point:
+    """The point of a resolved config."""
+    settings, study = read_config(tree)
+    return Point(settings, results_folder(study))
+
+
+def _main() -> None:
+    """A job as a process of its own, told on standard input what to run."""
+    told = json.load(sys.stdin)
+    end_when(lambda: os.getppid() != told["parent"] or not Path(told["while"]).exists())
+    run_share({tuple(job): tree for job, tree in told["share"]}, told["workers"])
+
+
+if __name__ == "__main__":
+    _main()

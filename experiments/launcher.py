@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from itertools import islice
 from multiprocessing import resource_tracker
@@ -124,15 +124,20 @@ class PoolLauncher(Launcher):
         return plain_tree(self.context.config_loader.load_sweep_config(self.config, list(job)))
 
 
-def _end_with(parent: int) -> None:
-    """In a worker: end when the process that started it has ended, however that was killed."""
+def end_when(needless: Callable[[], bool]) -> None:
+    """End this process once nobody needs it."""
 
     def watch() -> None:
-        while os.getppid() == parent:
+        while not needless():
             time.sleep(0.2)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """In a worker: end when the process that started it has ended, however that was killed."""
+    end_when(lambda: os.getppid() != parent)
 
 
 def _error(future: Future[Any]) -> BaseException | None:

@@ -21,6 +21,7 @@ from hydra.core.plugins import Plugins
 from omegaconf import DictConfig
 
 from experiments.config import ConfigError
+from experiments.dask_engine import DaskLauncher
 from experiments.errors import explain, of_config
 from experiments.launcher import PoolLauncher
 from experiments.places import CONF
@@ -79,6 +80,14 @@ _SLURM = {
 }
 
 
+_DASK = {
+    "jobs": 100,  # the points are dealt to them
+    "scheduler": None,  # address of a running cluster; null starts one in this process
+    "threads": "${workers}",  # of the cluster in this process
+    "fail_fast": "${sweep.fail_fast}",
+}
+
+
 @cache  # Hydra 1.4 wants them once
 def register_plugins() -> None:
     """Make the sweeper and the launcher known to Hydra, however the project is installed."""
@@ -93,6 +102,7 @@ def register_plugins() -> None:
             {"workers": "${workers}", "fail_fast": "${sweep.fail_fast}"},
         ),
         ("hydra/launcher", "slurm", SlurmLauncher, _SLURM),
+        ("hydra/launcher", "dask", DaskLauncher, _DASK),
     ):
         Plugins.instance().register(plugin)
         target = f"{plugin.__module__}.{plugin.__name__}"

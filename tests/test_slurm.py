@@ -83,7 +83,7 @@ def test_killed_job_fails_alone_and_is_resumed(cluster: list[str], tmp_path: Pat
     assert status == 1, out + err
     assert "2 SLURM jobs, 7_0 to 7_1" in out
     assert "2 of 4 points failed" in err
-    assert err.count("ended without a result; its log is in") == 2
+    assert err.count("no result; its log is in") == 2
     assert len(list((tmp_path / "results" / "points").glob("*/record.json"))) == 2
     assert not list((tmp_path / "results").rglob("*.pkl"))
     (tmp_path / "healed").touch()
@@ -111,7 +111,7 @@ def test_job_that_dies_before_its_points_start_passes_for_nothing_earlier(
     status, out, err = run(tmp_path, *sweep, *cluster, "sweep.force=true")
     assert status == 1, out + err
     assert "2 of 2 points failed" in err
-    assert err.count("ended without a result; its log is in") == 2
+    assert err.count("no result; its log is in") == 2
     assert "ArithmeticError" not in err
     failure = json.loads(failed.read_bytes())
     assert (failure["attempt"], failure["reason"], failure["started"]) == (2, "died", None)
