@@ -27,6 +27,7 @@ CELLS, DT, ACTIONS = 400, 0.25, 9
 # The grids whose trajectories are compared, coarse to fine, or the nearest that the study holds.
 COMPARED = (100, 900, 1600)
 
+_MOST_TRUTHS = 4  # of a study that has examples: of more, they would be neither few nor small
 _ENOUGH = 0.9  # of the demonstrations are feasible in all compared grids at a dt that can be chosen
 _PATH_EVERY = 2  # samples of the table `paths` between those that are drawn of many paths
 _DECIMALS = 4  # of coordinates that are only drawn
@@ -41,15 +42,23 @@ def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
     Returns:
         Of one point a truth, `example_ranking`, its table `hypotheses` with Phi of one trial;
         `example_paths`, its demonstrations, thinned out; `example_cells`, the cells of that
-        trial's sampled trajectory; `example_moves`, the moves from these cells. And of one trial a
-        truth in several grids, `compared_cells`, `compared_violations` and `compared_paths`.
+        trial's sampled trajectory; `example_moves`, the moves from these cells; and its own
+        `example_regions` and `example_dimensions`. And of one trial a truth in several grids,
+        `compared_cells`, `compared_violations` and `compared_paths`. A study of many truths has
+        none of these.
     """
     tables: dict[str, list[pd.DataFrame]] = {
-        **{f"example_{name}": [] for name in ("ranking", "paths", "cells", "moves")},
+        **{
+            f"example_{name}": []
+            for name in ("ranking", "paths", "cells", "moves", "regions", "dimensions")
+        },
         **{f"compared_{name}": [] for name in ("cells", "violations", "paths")},
     }
-    for truth in sorted({point.settings.truth.name for point in points}):
-        of_truth = [point for point in points if point.settings.truth.name == truth]
+    truths = sorted({_truth(point) for point in points})
+    if len(truths) > _MOST_TRUTHS:
+        return {}
+    for truth in truths:
+        of_truth = [point for point in points if _truth(point) == truth]
         example = min(of_truth, key=_distance)
         for name, table in _example(example).items():
             tables[name].append(table)
@@ -60,6 +69,11 @@ def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
         path = _of_trial(_read(example, "paths"), trial, "demonstration")
         tables["compared_paths"].append(path.round(_DECIMALS))
     return {name: _joined(parts) for name, parts in tables.items()}
+
+
+def _truth(point: Point) -> str:
+    """The name of a point's truth in tables."""
+    return str(point.settings.columns["truth"])
 
 
 def _distance(point: Point) -> tuple[float, ...]:
@@ -88,6 +102,8 @@ def _example(point: Point) -> dict[str, pd.DataFrame]:
         "example_paths": paths[(place % _PATH_EVERY == 0) | last].round(_DECIMALS),
         "example_cells": _cells(point, trial),
         "example_moves": _moves(point),
+        "example_regions": _read(point, "regions"),
+        "example_dimensions": _read(point, "dimensions"),
     }
 
 

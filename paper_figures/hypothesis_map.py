@@ -17,14 +17,14 @@ from paper_figures.style import COLUMN, EDGE, GAIN, PATH, RC, TRUTH, VIOLATED, n
 TABLES = {
     "example_ranking": ("truth", "cells", "actions", "dt", "hypothesis", "gain", "rank"),
     "example_paths": ("truth", "demonstration"),
-    "dimensions": ("truth", "name", "unit", "lower", "upper", "periodic"),
+    "example_dimensions": ("truth", "name", "unit", "lower", "upper", "periodic"),
 }
 EACH = "truth"
 TOP = 5
 
 
 def draw(
-    example_ranking: pd.DataFrame, example_paths: pd.DataFrame, dimensions: pd.DataFrame
+    example_ranking: pd.DataFrame, example_paths: pd.DataFrame, example_dimensions: pd.DataFrame
 ) -> Figure:
     """Draw one ranking.
 
@@ -32,10 +32,11 @@ def draw(
         example_ranking: one row a hypothesis: rank, gain [nat], feasible, and lower_<d>, upper_<d>
             of each dimension d; optionally `covered_by_truth`, and what the point was.
         example_paths: the demonstrations: demonstration, and a column for each dimension.
-        dimensions: name, unit, lower, upper and periodic of each dimension of the state. The
-            first two that hypotheses bound are drawn, or, where they bound one, that and another.
+        example_dimensions: name, unit, lower, upper and periodic of each dimension of the state.
+            The first two that hypotheses bound are drawn, or, where they bound one, that and
+            another.
     """
-    hypotheses, plane = example_ranking, Plane.of(example_ranking, dimensions)
+    hypotheses, plane = example_ranking, Plane.of(example_ranking, example_dimensions)
     figure, axes = new_figure(COLUMN, 3.1)
     with plt.rc_context(RC):
         feasible = hypotheses["feasible"].to_numpy(dtype=bool)
@@ -66,7 +67,7 @@ def draw(
 
 
 def facts(
-    example_ranking: pd.DataFrame, example_paths: pd.DataFrame, dimensions: pd.DataFrame
+    example_ranking: pd.DataFrame, example_paths: pd.DataFrame, example_dimensions: pd.DataFrame
 ) -> str:
     """What the caption says."""
     best = example_ranking.sort_values("rank", kind="stable")

@@ -10,6 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from paper_figures.plane import Plane, axis_label, centre, numbered, outline
 from paper_figures.selection import Unsuited, described
@@ -36,8 +37,8 @@ TABLES = {
     "example_paths": ("truth", "demonstration"),
     "example_cells": ("truth", "trial", "step", "cell"),
     "example_moves": ("truth", "cell", "successor"),
-    "regions": ("truth", "region"),
-    "dimensions": ("truth", "name", "unit", "lower", "upper", "periodic"),
+    "example_regions": ("truth", "region"),
+    "example_dimensions": ("truth", "name", "unit", "lower", "upper", "periodic"),
 }
 _PATHS = 15  # demonstrations, so that each can be seen
 _STEPS = 5  # moves of the sampled trajectory that are shown
@@ -49,8 +50,8 @@ def draw(
     example_paths: pd.DataFrame,
     example_cells: pd.DataFrame,
     example_moves: pd.DataFrame,
-    regions: pd.DataFrame,
-    dimensions: pd.DataFrame,
+    example_regions: pd.DataFrame,
+    example_dimensions: pd.DataFrame,
 ) -> Figure:
     """Draw demonstrations, moves of the tabular MDP, Phi of one trial, and the ranking.
 
@@ -59,14 +60,16 @@ def draw(
         example_paths: its demonstrations.
         example_cells: the cells of one trial's sampled trajectory, with corners.
         example_moves: the moves from these cells, with both cells' corners.
-        regions: the boxes of the truth.
-        dimensions: a row a dimension of the state.
+        example_regions: the boxes of the truth.
+        example_dimensions: a row a dimension of the state.
     """
+    if not len(example_regions):
+        raise Unsuited("nothing is forbidden")
     ranking, paths, visits, moves, boxes, state = (
-        _of_first(table, example_ranking)
+        _of_first(table, example_regions)
         for table in (
             *(example_ranking, example_paths, example_cells),
-            *(example_moves, regions, dimensions),
+            *(example_moves, example_regions, example_dimensions),
         )
     )
     if not len(visits):
@@ -96,12 +99,12 @@ def facts(
     example_paths: pd.DataFrame,
     example_cells: pd.DataFrame,
     example_moves: pd.DataFrame,
-    regions: pd.DataFrame,
-    dimensions: pd.DataFrame,
+    example_regions: pd.DataFrame,
+    example_dimensions: pd.DataFrame,
 ) -> str:
     """What the caption says."""
     ranking, paths, visits = (
-        _of_first(table, example_ranking)
+        _of_first(table, example_regions)
         for table in (example_ranking, example_paths, example_cells)
     )
     known = ranking[ranking["covered_by_truth"].astype(bool)]
@@ -129,9 +132,9 @@ def facts(
     return "\n".join(lines)
 
 
-def _of_first(table: pd.DataFrame, example_ranking: pd.DataFrame) -> pd.DataFrame:
-    """The rows of the first truth."""
-    return table[table["truth"] == example_ranking["truth"].min()]
+def _of_first(table: pd.DataFrame, example_regions: pd.DataFrame) -> pd.DataFrame:
+    """The rows of the first truth that forbids anything."""
+    return table[table["truth"] == example_regions["truth"].min()]
 
 
 def _draw_demonstrations(
@@ -151,10 +154,14 @@ def _draw_moves(axes: Axes, visits: pd.DataFrame, moves: pd.DataFrame, plane: Pl
     """The first cells of a trajectory, the moves from them and those that it takes."""
     first = visits.sort_values("step").head(_STEPS + 1)
     shown = moves[moves["cell"].isin(first["cell"])].drop_duplicates(["cell", "successor"])
-    ends = shown[[name for name in shown if name.startswith("successor_")]]
-    ends = ends.rename(columns=lambda name: name.removeprefix("successor_"))
-    around = centre(plane.rectangles(first.iloc[:1])[0])
-    visited, begins, ends = (plane.near(boxes, around) for boxes in (first, shown, ends))
+    after = shown[[name for name in shown if name.startswith("successor_")]]
+    after = after.rename(columns=lambda name: name.removeprefix("successor_"))
+    visited: list[Rectangle] = []
+    for box in plane.rectangles(first):
+        visited.append(plane.beside(box, visited[-1]) if visited else box)
+    place = dict(zip(first["cell"], visited, strict=True))
+    begins = [place[cell] for cell in shown["cell"]]
+    ends = [plane.beside(*pair) for pair in zip(plane.rectangles(after), begins, strict=True)]
     for box in visited:
         box.set(facecolor=SAMPLED, alpha=0.45, linewidth=0)
         axes.add_patch(box)

@@ -84,18 +84,15 @@ class Plane:
                 ]
         return found
 
-    def near(self, boxes: pd.DataFrame, point: tuple[float, float]) -> list[Rectangle]:
-        """Each box, moved by whole periods to where its centre is nearest to a point."""
-        found = self.rectangles(boxes)
+    def beside(self, box: Rectangle, other: Rectangle) -> Rectangle:
+        """A box moved by whole periods to where its centre is nearest to that of another."""
+        corner = list(box.get_xy())
         for column, dimension in enumerate((self.x, self.y)):
             if dimension["periodic"]:
                 period = dimension["upper"] - dimension["lower"]
-                for box in found:
-                    corner = list(box.get_xy())
-                    turns = np.round((centre(box)[column] - point[column]) / period)
-                    corner[column] -= turns * period
-                    box.set_xy(corner)
-        return found
+                ahead = (centre(box)[column] - centre(other)[column]) / period
+                corner[column] -= np.round(ahead) * period
+        return Rectangle(tuple(corner), box.get_width(), box.get_height())
 
     def dress(self, axes: Axes) -> None:
         """Set limits and labels with units; a whole turn in radians has ticks by its quarters."""

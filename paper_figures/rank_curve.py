@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from paper_figures.selection import paper_rows
+from paper_figures.selection import Unsuited, paper_rows
 from paper_figures.style import GUIDE, PAGE, RC, mark, new_figure
 
 TABLES = {
@@ -34,6 +34,8 @@ def draw(rank_curve: pd.DataFrame) -> Figure:
         rank_curve: the table of that name: a row a number of demonstrations and setting.
     """
     curves, top = paper_rows(rank_curve, _KEYS), _top(rank_curve)
+    if curves["median"].isna().all():
+        raise Unsuited("there is no truth to rank")
     truths, dts = sorted(curves["truth"].unique()), sorted(curves["dt"].unique())
     figure, grid = new_figure(
         PAGE * max(1, len(truths)) / 2,
@@ -54,7 +56,7 @@ def draw(rank_curve: pd.DataFrame) -> Figure:
                     style = {**mark(int(cells), number), "markevery": (number % _MARKED, _MARKED)}
                     _draw_rank(left, curve, style)
                     _draw_share(right, curve, top, style)
-                left.axhspan(0.9, top, color="#000000", alpha=0.05, linewidth=0)
+                left.axhspan(0.9, top, color="black", alpha=0.05, linewidth=0)
                 left.set_yscale("log")
                 left.set_ylim(0.9, 100)
                 left.set_yticks(_TICKS, labels=[str(tick) for tick in _TICKS])

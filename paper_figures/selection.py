@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import pandas as pd
 
 # What the paper's figures show, where a study holds it; the nearest that it holds otherwise.
-CELLS, ACTIONS, DT, SAMPLES = 400, 9, 0.25, 1
+ACTIONS, SAMPLES = 9, 1
+
+_MOST_TRUTHS = 4  # that have panels of their own in one figure
 
 
 class Unsuited(Exception):
@@ -26,8 +28,11 @@ def paper_rows(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
     """The rows with 9 actions and one sample a cell, or nearest to them, which `keys` tell apart.
 
     Raises:
-        Unsuited: something else varies in the table, so that rows would lie on one another.
+        Unsuited: something else varies in the table, so that rows would lie on one another, or
+            there are too many truths for panels of their own.
     """
+    if (count := table["truth"].nunique()) > _MOST_TRUTHS:
+        raise Unsuited(f"{count} truths are more than {_MOST_TRUTHS} panels")
     chosen = nearest(nearest(table, "actions", ACTIONS), "samples", SAMPLES)
     if chosen.duplicated(list(keys)).any():
         raise Unsuited(f"rows differ in more than {', '.join(keys)}")

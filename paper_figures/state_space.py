@@ -12,26 +12,28 @@ from paper_figures.style import COLUMN, EDGE, RC, TRUTHS, new_figure
 
 TABLES = {
     "example_ranking": ("truth", "hypothesis"),
-    "regions": ("truth", "region"),
-    "dimensions": ("truth", "name", "unit", "lower", "upper", "periodic"),
+    "example_regions": ("truth", "region"),
+    "example_dimensions": ("truth", "name", "unit", "lower", "upper", "periodic"),
 }
 
 
-def draw(example_ranking: pd.DataFrame, regions: pd.DataFrame, dimensions: pd.DataFrame) -> Figure:
+def draw(
+    example_ranking: pd.DataFrame, example_regions: pd.DataFrame, example_dimensions: pd.DataFrame
+) -> Figure:
     """Draw them.
 
     Args:
         example_ranking: the hypotheses: lower_<d> and upper_<d> of each dimension d.
-        regions: the boxes of each truth, likewise.
-        dimensions: a row a dimension of the state.
+        example_regions: the boxes of each truth, likewise.
+        example_dimensions: a row a dimension of the state.
     """
     hypotheses = _of_one_truth(example_ranking)
-    plane = Plane.of(hypotheses, _of_one_truth(dimensions))
+    plane = Plane.of(hypotheses, _of_one_truth(example_dimensions))
     figure, axes = new_figure(COLUMN, 2.7)
     with plt.rc_context(RC):
         plane.cells(axes, hypotheses, facecolor="none", linewidth=0.5)
         entries = [Patch(facecolor="white", edgecolor=EDGE, label="hypothesis")]
-        for place, (truth, boxes) in enumerate(_distinct(regions).groupby("truth", sort=True)):
+        for place, (truth, boxes) in enumerate(example_regions.groupby("truth", sort=True)):
             colour = TRUTHS[place % len(TRUTHS)]
             for box in plane.regions(boxes):
                 box.set(facecolor=colour, edgecolor="black", linewidth=0.6, zorder=3)
@@ -44,9 +46,11 @@ def draw(example_ranking: pd.DataFrame, regions: pd.DataFrame, dimensions: pd.Da
     return figure
 
 
-def facts(example_ranking: pd.DataFrame, regions: pd.DataFrame, dimensions: pd.DataFrame) -> str:
+def facts(
+    example_ranking: pd.DataFrame, example_regions: pd.DataFrame, example_dimensions: pd.DataFrame
+) -> str:
     """What the caption says."""
-    state = _of_one_truth(dimensions)
+    state = _of_one_truth(example_dimensions)
     lines = [
         "The state space, the hypotheses and the true constraints.",
         *(
@@ -56,7 +60,7 @@ def facts(example_ranking: pd.DataFrame, regions: pd.DataFrame, dimensions: pd.D
         ),
         f"Hypotheses: {len(_of_one_truth(example_ranking))}.",
     ]
-    for _, box in _distinct(regions).iterrows():
+    for _, box in example_regions.iterrows():
         sides = [
             f"{row.name.replace('_', ' ')} {box[f'lower_{row.name}']:.6g} to "
             f"{box[f'upper_{row.name}']:.6g} {row.unit}"
@@ -70,9 +74,3 @@ def facts(example_ranking: pd.DataFrame, regions: pd.DataFrame, dimensions: pd.D
 def _of_one_truth(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of the first truth: hypotheses and state space are the same for all."""
     return table[table["truth"] == table["truth"].min()]
-
-
-def _distinct(regions: pd.DataFrame) -> pd.DataFrame:
-    """The boxes of each truth once, however many settings the table holds them for."""
-    corners = [name for name in regions if name.startswith(("lower_", "upper_"))]
-    return regions.drop_duplicates(["truth", *corners])

@@ -28,8 +28,8 @@ TABLES = {
     "compared_violations": ("truth", "cells", "source", "hypothesis"),
     "compared_paths": ("truth", "demonstration", "time"),
     "example_ranking": ("truth", "hypothesis"),
-    "regions": ("truth", "region"),
-    "dimensions": ("truth", "name", "unit", "lower", "upper", "periodic"),
+    "example_regions": ("truth", "region"),
+    "example_dimensions": ("truth", "name", "unit", "lower", "upper", "periodic"),
 }
 # Whose hatching leans which way, and in which colour.
 _HATCHES = {"demonstration": ("\\\\\\\\\\", DEMONSTRATION), "sampled": ("/////", SAMPLED)}
@@ -40,8 +40,8 @@ def draw(
     compared_violations: pd.DataFrame,
     compared_paths: pd.DataFrame,
     example_ranking: pd.DataFrame,
-    regions: pd.DataFrame,
-    dimensions: pd.DataFrame,
+    example_regions: pd.DataFrame,
+    example_dimensions: pd.DataFrame,
 ) -> Figure:
     """Draw a row of panels a truth, coarse to fine.
 
@@ -50,8 +50,8 @@ def draw(
         compared_violations: hypotheses that it and the demonstration violate, with corners.
         compared_paths: the demonstration.
         example_ranking: all hypotheses, for their edges.
-        regions: the boxes of each truth.
-        dimensions: a row a dimension of the state.
+        example_regions: the boxes of each truth.
+        example_dimensions: a row a dimension of the state.
     """
     if not len(compared_cells):
         raise Unsuited("no demonstration is feasible in all grids")
@@ -72,7 +72,7 @@ def draw(
                 table[table["truth"] == truth]
                 for table in (
                     *(compared_cells, compared_violations, compared_paths),
-                    *(example_ranking, regions, dimensions),
+                    *(example_ranking, example_regions, example_dimensions),
                 )
             )
             plane = Plane.of(hypotheses, state)
@@ -96,8 +96,8 @@ def facts(
     compared_violations: pd.DataFrame,
     compared_paths: pd.DataFrame,
     example_ranking: pd.DataFrame,
-    regions: pd.DataFrame,
-    dimensions: pd.DataFrame,
+    example_regions: pd.DataFrame,
+    example_dimensions: pd.DataFrame,
 ) -> str:
     """What the caption says."""
     lines = [

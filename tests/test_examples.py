@@ -17,6 +17,10 @@ from mlci.grids import Grid
 SHAPES = [(12, 8), (24, 12), (30, 30)]
 
 
+def grid_of(settings: Settings, shape: tuple[int, ...]) -> GridSettings:
+    return dataclasses.replace(settings.grid, shape=shape)
+
+
 @pytest.fixture(scope="module")
 def points(settings: Settings, tmp_path_factory: pytest.TempPathFactory) -> list[Point]:
     """Two time steps in three grids, and another seed in one of them."""
@@ -24,7 +28,9 @@ def points(settings: Settings, tmp_path_factory: pytest.TempPathFactory) -> list
     more = dataclasses.replace(settings.demonstrations, pairs=20, keep=8)
     settings = dataclasses.replace(settings, horizon=4.0, demonstrations=more)
     found = [
-        Point(dataclasses.replace(settings, grid=GridSettings(shape), dt=dt, seed=seed), results)
+        Point(
+            dataclasses.replace(settings, grid=grid_of(settings, shape), dt=dt, seed=seed), results
+        )
         for shape in SHAPES
         for dt in (0.25, 0.5)
         for seed in ((0, 1) if shape == (24, 12) else (0,))
@@ -132,3 +138,16 @@ def test_order_of_points_does_not_matter_and_truths_stand_apart(points: list[Poi
     one, two = example_tables(points), example_tables(points[::-1])
     for name, table in one.items():
         pd.testing.assert_frame_equal(table, two[name])
+
+
+def test_many_truths_have_no_examples(points: list[Point]) -> None:
+    named = [
+        Point(
+            dataclasses.replace(
+                points[0].settings, truth=dataclasses.replace(points[0].settings.truth, name=name)
+            ),
+            points[0].results,
+        )
+        for name in "abcde"
+    ]
+    assert example_tables(named) == {}

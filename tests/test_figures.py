@@ -1,117 +1,43 @@
-"""What figures draw, against the tables that they were given."""
+"""Figures of a study: which are drawn, what comes with them, how they look."""
 
 from __future__ import annotations
 
 import hashlib
+import importlib
 import json
 import re
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.collections import PatchCollection
-from matplotlib.colors import to_hex
+from figure_study import curve_rows, measure_rows, path_rows, study_tables
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
-from paper_figures import hypothesis_map, rank_curve
-from paper_figures.__main__ import draw_study
+from paper_figures import final_state_error, hypothesis_map, rank_curve, state_space
+from paper_figures.__main__ import FIGURES, draw_study
 from paper_figures.origin import SHARED, concerns
 from paper_figures.selection import Unsuited
-from paper_figures.style import CELL_COLOURS, CELL_MARKS, TRUTH, save
+from paper_figures.style import CELL_COLOURS, CELL_MARKS, COLUMN, PAGE, TRUTH, save
 
 
-def dimension_rows() -> pd.DataFrame:
-    return pd.DataFrame(
-        {
-            "truth": "c1",
-            "name": ["angle", "speed"],
-            "unit": ["rad", "rad/s"],
-            "lower": [0.0, -2.0],
-            "upper": [2 * np.pi, 2.0],
-            "periodic": [True, False],
-        }
-    )
-
-
-def hypothesis_rows() -> pd.DataFrame:
-    """Two by two cells: one violated, one of no gain, and the truth ranked first."""
-    lower = np.array([(a, s) for a in (0.0, np.pi) for s in (-2.0, 0.0)])
-    return pd.DataFrame(
-        {
-            "truth": "c1",
-            "cells": 400,
-            "actions": 9,
-            "dt": 0.25,
-            "point": "0123456789abcdef",
-            "hypothesis": range(4),
-            "lower_angle": lower[:, 0],
-            "lower_speed": lower[:, 1],
-            "upper_angle": lower[:, 0] + np.pi,
-            "upper_speed": lower[:, 1] + 2,
-            "feasible": [True, False, True, True],
-            "gain": [0.0, -np.inf, 1.5, 6.0],
-            "rank": [3.0, 4.0, 2.0, 1.0],
-            "posterior": [0.0, 0.0, 0.1, 0.8],
-            "covered_by_truth": [False, False, False, True],
-        }
-    )
-
-
-def path_rows() -> pd.DataFrame:
-    """Two paths, of which the second passes a whole turn."""
-    return pd.DataFrame(
-        {
-            "truth": "c1",
-            "demonstration": [0] * 3 + [1] * 4,
-            "angle": [0.5, 1.0, 1.5, 5.5, 6.1, 6.6, 7.0],
-            "speed": [0.1, 0.2, 0.1, 1.0, 1.1, 1.1, 1.0],
-        }
-    )
-
-
-def curve_rows() -> pd.DataFrame:
-    rows = [
-        {"truth": t, "cells": c, "actions": a, "dt": dt, "samples": 1, "demonstrations": n}
-        for t in ("c1", "c2")
-        for c in (100, 400)
-        for a in (5, 9)
-        for dt in (0.25, 0.5)
-        for n in range(1, 7)
-    ]
-    table = pd.DataFrame(rows)
-    middle = 30 / table["demonstrations"] + table["cells"] / 100 + table["actions"]
-    share = 1 - 1 / table["demonstrations"] + table["dt"] / 10
-    return table.assign(
-        q25=middle - 1,
-        median=middle,
-        q75=middle + 2,
-        median_low=middle - 0.5,
-        median_high=middle + 0.25,
-        seeds=5,
-        share_top_5=share,
-        share_top_5_low=share - 0.05,
-        share_top_5_high=share + 0.02,
-    )
-
-
-def test_hypothesis_map_shows_what_the_table_says() -> None:
-    figure = hypothesis_map.draw(hypothesis_rows(), path_rows(), dimension_rows())
-    axes = figure.axes[0]
-    feasible, violated = (c for c in axes.collections if isinstance(c, PatchCollection))
-    np.testing.assert_allclose(np.square(feasible.get_array()), [0.0, 1.5, 6.0])
-    corners = [path.vertices.min(axis=0) for path in violated.get_paths()]
-    np.testing.assert_allclose(corners, [[0.0, 0.0]])
-    outlines = {to_hex(patch.get_edgecolor()): patch.get_xy() for patch in axes.patches}
-    assert outlines[TRUTH] == pytest.approx((np.pi, 0.0))
-    assert [text.get_text() for text in axes.texts] == ["2", "1"]
-    assert axes.get_xlabel() == "angle [rad]"
-    assert axes.get_ylabel() == "speed [rad/s]"
+def of_c1(module: ModuleType) -> dict[str, pd.DataFrame]:
+    """The rows of one truth in the tables that a module needs."""
+    tables = {name: study_tables()[name] for name in module.TABLES}
+    return {
+        name: table[table["truth"] == "c1"].reset_index(drop=True) for name, table in tables.items()
+    }
 
 
 def test_hypotheses_over_one_dimension_span_the_other() -> None:
-    table = hypothesis_rows().assign(lower_speed=-np.inf, upper_speed=np.inf)
-    figure = hypothesis_map.draw(table, path_rows(), dimension_rows())
+    tables = of_c1(hypothesis_map)
+    free = {"lower_speed": -np.inf, "upper_speed": np.inf}
+    tables["example_ranking"] = tables["example_ranking"].assign(**free)
+    figure = hypothesis_map.draw(**tables)
     outlines = {to_hex(patch.get_edgecolor()): patch for patch in figure.axes[0].patches}
     truth = outlines[TRUTH]
     assert truth.get_xy() == pytest.approx((np.pi, -2.0))
@@ -119,43 +45,11 @@ def test_hypotheses_over_one_dimension_span_the_other() -> None:
 
 
 def test_a_path_is_broken_where_it_wraps() -> None:
-    figure = hypothesis_map.draw(hypothesis_rows(), path_rows(), dimension_rows())
+    figure = hypothesis_map.draw(**of_c1(hypothesis_map))
     lines = [line.get_xydata() for line in figure.axes[0].lines if len(line.get_xdata()) > 1]
     np.testing.assert_allclose(lines[0], path_rows()[["angle", "speed"]].to_numpy()[:3])
     second = np.array([5.5, 6.1, np.nan, 6.6 - 2 * np.pi, 7.0 - 2 * np.pi])
     np.testing.assert_allclose(lines[1][:, 0], second)
-
-
-def test_rank_curves_are_the_medians_bands_and_shares_of_the_table() -> None:
-    table = curve_rows()
-    figure = rank_curve.draw(table)
-    grid = np.array(figure.axes).reshape(2, 4)
-    wanted = table[table["actions"] == 9]
-    for (truth, dt), part in wanted.groupby(["truth", "dt"]):
-        left, right = grid[[0.25, 0.5].index(dt), 2 * ["c1", "c2"].index(truth) :][:2]
-        assert left.get_title(loc="left") == f"{truth.upper()}, $\\Delta t$ = {dt:g} s"
-        assert left.get_yscale() == "log"
-        for place, (cells, rows) in enumerate(part.groupby("cells")):
-            sides = [
-                (left, rows["median"], rows["q25"], rows["q75"]),
-                (right, *(100 * rows[f"share_top_5{end}"] for end in ("", "_low", "_high"))),
-            ]
-            for axes, middle, low, high in sides:
-                curve = axes.lines[place]
-                np.testing.assert_allclose(curve.get_ydata(), middle)
-                np.testing.assert_allclose(curve.get_xdata(), rows["demonstrations"])
-                assert curve.get_marker() == CELL_MARKS[cells]
-                assert to_hex(curve.get_color()) == CELL_COLOURS[cells]
-                edges = axes.collections[place].get_paths()[0].vertices
-                for x, least, most in zip(rows["demonstrations"], low, high, strict=True):
-                    at = edges[edges[:, 0] == x, 1]
-                    assert (at.min(), at.max()) == pytest.approx((least, most))
-    said = rank_curve.facts(table)
-    row = wanted[(wanted["demonstrations"] == 6) & (wanted["cells"] == 400)].iloc[-1]
-    assert (
-        f"C2, 400 cells, dt 0.5 s: median rank {row['median']:.3g} ({row['median_low']:.3g} to "
-        f"{row['median_high']:.3g}), in the top 5 {100 * row['share_top_5']:.0f} %"
-    ) in said
 
 
 def test_rows_that_would_lie_on_one_another_are_not_drawn() -> None:
@@ -164,11 +58,27 @@ def test_rows_that_would_lie_on_one_another_are_not_drawn() -> None:
         rank_curve.draw(twice)
 
 
+def test_many_truths_and_none_to_rank_are_not_drawn() -> None:
+    many = pd.concat([curve_rows().assign(truth=f"cell_{number}") for number in range(5)])
+    with pytest.raises(Unsuited, match="5 truths are more than 4 panels"):
+        rank_curve.draw(many)
+    with pytest.raises(Unsuited, match="there is no truth to rank"):
+        rank_curve.draw(curve_rows().assign(median=np.nan))
+
+
+def test_what_does_not_vary_is_no_curve() -> None:
+    rows = measure_rows()
+    with pytest.raises(Unsuited, match="neither cells nor dt varies"):
+        final_state_error.draw(rows[(rows["cells"] == 100) & (rows["dt"] == 0.5)])
+    with pytest.raises(Unsuited, match="table measures has no measure final_state_error"):
+        final_state_error.draw(rows[rows["measure"] != "final_state_error"])
+
+
 def test_the_same_tables_make_the_same_bytes(tmp_path: Path) -> None:
     for name in ("one", "two"):
-        save(rank_curve.draw(curve_rows()), tmp_path / name / "curve")
+        save(hypothesis_map.draw(**of_c1(hypothesis_map)), tmp_path / name / "map")
     for suffix in (".png", ".pdf"):
-        one, two = ((tmp_path / name / f"curve{suffix}").read_bytes() for name in ("one", "two"))
+        one, two = ((tmp_path / name / f"map{suffix}").read_bytes() for name in ("one", "two"))
         assert one == two
 
 
@@ -184,41 +94,78 @@ def write_tables(study: Path, tables: dict[str, pd.DataFrame]) -> dict[str, str]
 
 
 def test_a_study_is_drawn_from_its_tables_alone(tmp_path: Path) -> None:
-    map_tables = {
-        "example_ranking": hypothesis_rows(),
-        "example_paths": path_rows(),
-        "dimensions": dimension_rows(),
-    }
-    digests = write_tables(tmp_path, {**map_tables, "rank_curve": curve_rows()})
+    digests = write_tables(tmp_path, study_tables())
     drawn = draw_study(tmp_path)
-    assert [path.name for path in drawn] == ["rank_curve.png", "hypothesis_map_c1.png"]
+    names = {path.stem for path in drawn}
+    single = {module.__name__.rpartition(".")[2] for module in FIGURES} - {"hypothesis_map"}
+    assert names == single | {"hypothesis_map_c1", "hypothesis_map_c2"}
     note = json.loads((tmp_path / "figures" / "figures.json").read_text())["figures"]
-    assert note["rank_curve"]["tables"] == {"rank_curve.csv": digests.pop("rank_curve.csv")}
-    assert note["hypothesis_map_c1"]["tables"] == digests
+    assert set(note) == names
     for png in drawn:
-        files = {png.with_suffix(suffix).name for suffix in (".png", ".pdf", ".txt")}
-        assert set(note[png.stem]["files"]) == files
-        source = f"study {tmp_path.name}, whose points are not listed"
-        assert Image.open(png).text["Source"] == source
-        assert png.with_suffix(".txt").read_text().endswith(f"\nSource: {source}.\n")
-    assert concerns(tmp_path) == {"hypothesis_map_c1": [], "rank_curve": []}
+        module = importlib.import_module(f"paper_figures.{note[png.stem]['module']}")
+        used = {f"{name}.csv": digests[f"{name}.csv"] for name in module.TABLES}
+        assert note[png.stem]["tables"] == used
+        files = [png.with_suffix(suffix) for suffix in (".png", ".pdf", ".txt")]
+        assert note[png.stem]["files"] == {
+            file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files
+        }
+    assert concerns(tmp_path) == {name: [] for name in sorted(names)}
+
+
+STATE_SPACE = {name: study_tables()[name] for name in state_space.TABLES}
+
+
+def test_every_file_tells_its_origin(tmp_path: Path) -> None:
+    write_tables(tmp_path, STATE_SPACE)
+    (png,) = draw_study(tmp_path)
+    sources = [f"study {tmp_path.name}, whose points are not listed"]
+    collated = {
+        "points": ["a" * 32, "b" * 32],
+        "sources": {"s": 2},
+        "commits": ["c" * 40],
+        "dirty": True,
+        "started": ["2026-01-02T03:04:05+00:00", "2026-01-02T03:05:06+00:00"],
+    }
+    (tmp_path / "study.json").write_text(json.dumps({"collated": collated}))
+    before = png.read_bytes(), png.with_suffix(".pdf").read_bytes()
+    found = [Image.open(png).text, png.with_suffix(".txt").read_text()]
+    draw_study(tmp_path)
+    points = hashlib.sha256(f"{'a' * 32}\n{'b' * 32}".encode()).hexdigest()
+    sources.append(
+        f"study {tmp_path.name}, 2 points (digest {points[:12]}), git commit cccccccccccc, with "
+        "changes, data of 2026-01-02T03:05:06+00:00"
+    )
+    assert before != (png.read_bytes(), png.with_suffix(".pdf").read_bytes())
+    found += [Image.open(png).text, png.with_suffix(".txt").read_text()]
+    for source, text, facts in zip(sources, found[::2], found[1::2], strict=True):
+        assert text == {"Title": "state_space", "Source": source}
+        assert facts.endswith(f"\n\nSource: {source}.\n")
+    # A PDF spells its metadata in clear.
+    assert (
+        sources[1].replace("(", "\\(").replace(")", "\\)").encode()
+        in png.with_suffix(".pdf").read_bytes()
+    )
+    note = json.loads((tmp_path / "figures" / "figures.json").read_text())
+    assert note["study"] == {"points": points, "count": 2} | {
+        key: collated[key] for key in ("sources", "commits", "dirty", "started")
+    }
 
 
 def test_a_figure_without_its_table_stays_listed_and_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_tables(tmp_path, {"rank_curve": curve_rows()})
+    write_tables(tmp_path, STATE_SPACE)
     with pytest.raises(Unsuited, match=r"run the study first, python .* experiment=empty"):
         draw_study(tmp_path / "empty")
-    assert [path.name for path in draw_study(tmp_path)] == ["rank_curve.png"]
+    assert [path.name for path in draw_study(tmp_path)] == ["state_space.png"]
     assert capsys.readouterr().out == ""
-    table = tmp_path / "tables" / "rank_curve.csv"
-    table.write_text(curve_rows().drop(columns="q75").to_csv(index=False))
-    with pytest.raises(Unsuited, match="table rank_curve has no column q75"):
+    table = tmp_path / "tables" / "example_regions.csv"
+    table.write_text(STATE_SPACE["example_regions"].drop(columns="region").to_csv(index=False))
+    with pytest.raises(Unsuited, match="table example_regions has no column region"):
         draw_study(tmp_path)
-    assert "not drawn again: rank_curve: table rank_curve has no" in capsys.readouterr().out
+    assert "not drawn again: state_space: table example_regions has no" in capsys.readouterr().out
     table.unlink()
-    assert concerns(tmp_path)["rank_curve"] == ["table rank_curve.csv is missing"]
+    assert concerns(tmp_path)["state_space"] == ["table example_regions.csv is missing"]
 
 
 def test_figures_share_only_the_modules_that_their_freshness_depends_on() -> None:
@@ -226,3 +173,84 @@ def test_figures_share_only_the_modules_that_their_freshness_depends_on() -> Non
         if path.stem != "__main__":
             imported = re.findall(r"^from paper_figures\.(\w+) import", path.read_text(), re.M)
             assert set(imported) <= set(SHARED), path
+
+
+def test_colours_are_those_of_the_style() -> None:
+    for path in Path(hypothesis_map.__file__).parent.glob("*.py"):
+        text = path.read_text()
+        if path.stem != "style":
+            # Black and white apart, a colour has a name in the style module.
+            assert not re.findall(r"#[0-9a-fA-F]{3,8}\b|tab:\w+|\bC\d\b", text), path
+            assert set(re.findall(r'(?:colou?r|fc|ec)"?[=:] ?"(\w+)"', text)) <= {
+                *("black", "white", "none")
+            }, path
+
+
+@pytest.fixture(scope="module")
+def figures() -> dict[str, Figure]:
+    """Every figure of the known study, at its size in print."""
+    found = {}
+    for module in FIGURES:
+        each = hasattr(module, "EACH")
+        tables = of_c1(module) if each else {name: study_tables()[name] for name in module.TABLES}
+        found[module.__name__.rpartition(".")[2]] = module.draw(**tables)
+    for figure in found.values():
+        figure.canvas.draw()
+    return found
+
+
+NAMES = [module.__name__.rpartition(".")[2] for module in FIGURES]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_labels_have_units(name: str, figures: dict[str, Figure]) -> None:
+    figure = figures[name]
+    labels = {axes.get_xlabel() for axes in figure.axes} | {a.get_ylabel() for a in figure.axes}
+    labels |= {figure.get_supylabel()}
+    counted = {"", "demonstrations", "rank of truth", r"$\Phi_i$ of one trial"}
+    assert all(re.search(r"\[[^]]+\]$", label) for label in labels - counted), labels
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_text_lies_on_another_or_is_cut(name: str, figures: dict[str, Figure]) -> None:
+    figure = figures[name]
+    renderer = figure.canvas.get_renderer()
+    boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in shown_texts(figure)]
+    assert len(boxes) > 5
+    for place, (one, box) in enumerate(boxes):
+        assert box.x0 >= 0, one
+        assert box.y0 >= 0, one
+        assert box.x1 <= figure.bbox.x1, one
+        assert box.y1 <= figure.bbox.y1, one
+        for two, other in boxes[:place]:
+            apart = min(box.x1, other.x1) <= max(box.x0, other.x0) + 0.5
+            apart |= min(box.y1, other.y1) <= max(box.y0, other.y0) + 0.5
+            assert apart, (one, two)
+
+
+def shown_texts(figure: Figure) -> list[Text]:
+    """The texts of a figure that can be seen; a tick beyond its axis cannot."""
+    hidden = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
+                slack = 1e-9 * (high - low)
+                if not low - slack <= tick.get_loc() <= high + slack:
+                    hidden |= {tick.label1, tick.label2}
+    texts = figure.findobj(Text)
+    return [t for t in texts if t.get_visible() and t.get_text().strip() and t not in hidden]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_figures_fit_a_column_or_a_page(name: str, figures: dict[str, Figure]) -> None:
+    assert figures[name].get_figwidth() in (COLUMN, PAGE)
+    assert min(text.get_fontsize() for text in shown_texts(figures[name])) >= 5
+
+
+def test_curves_differ_in_grey() -> None:
+    red, green, blue = np.array([to_rgb(colour) for colour in CELL_COLOURS.values()]).T
+    luminance = np.sort(0.299 * red + 0.587 * green + 0.114 * blue)
+    # Two of them are close, and their marks tell them apart.
+    assert luminance[-1] - luminance[0] > 0.25
+    assert len(set(CELL_MARKS.values())) == len(CELL_MARKS)

@@ -28,7 +28,7 @@ mlci-results clean
 if grep 'not up to date' "$work/status"; then exit 1; fi
 [ "$(ls)" = results ]
 for table in trials ranks summary; do [ -s "results/smoke/tables/$table.csv" ]; done
-[ -s results/smoke/figures/rank_of_the_truth.pdf ]
+[ -s results/smoke/figures/rank_curve.pdf ]
 python - results/points/*/record.json <<'EOF'
 import json, sys
 import experiments
