@@ -1,24 +1,36 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
+# Every study, the paper's own first; the experiment `smoke` repeats it.
+STUDIES := paper $(filter-out paper smoke,$(basename $(notdir $(wildcard conf/experiment/*.yaml))))
 
-.PHONY: help paper figures smoke test stress lint benchmark lock
+.PHONY: help paper figures report smoke test stress lint benchmark lock
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-paper: $(READY) ## run the paper's whole sweep, write its tables and draw them
-	$(BIN)/python experiments/run.py -m experiment=paper
-	$(BIN)/python -m paper_figures paper
-
-figures: $(READY) ## draw all figures again, from the tables alone
-	$(BIN)/python -m paper_figures
-
-smoke: $(READY) ## run and draw every experiment, tiny, in seconds
-	@set -e; for each in $(basename $(notdir $(wildcard conf/experiment/*.yaml))); do \
-		$(BIN)/python experiments/run.py -m experiment=$$each scale=smoke study=smoke_$$each; \
-		$(BIN)/python -m paper_figures smoke_$$each; \
+paper: $(READY) ## run what is missing of all studies, draw their figures, write the report
+	@set -e; for each in $(STUDIES); do \
+		echo "=== study $$each"; \
+		$(BIN)/python experiments/run.py -m experiment=$$each; \
 	done
+	@$(MAKE) --no-print-directory figures
+
+figures: $(READY) ## draw all figures and write the report again, from the tables alone
+	$(BIN)/python -m paper_figures
+	@$(MAKE) --no-print-directory report
+
+report: $(READY) ## write results/paper/REPORT.md and .html, and the numbers in README.md
+	$(BIN)/python -m paper_report
+
+smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
+	@set -e; for each in $(STUDIES); do \
+		echo "=== study $$each"; \
+		$(BIN)/python experiments/run.py -m experiment=$$each scale=smoke study=$$each \
+			results=$(CURDIR)/results/smoke; \
+	done
+	$(BIN)/python -m paper_figures --results results/smoke
+	$(BIN)/python -m paper_report --results results/smoke
 
 test: $(READY) ## run the tests
 	$(BIN)/python -m pytest

@@ -35,6 +35,11 @@ def figures() -> int:
     return _start("paper_figures.__main__")
 
 
+def report() -> int:
+    """`mlci-report`: paper_report."""
+    return _start("paper_report.__main__")
+
+
 def _start(module: str) -> int:
     """Import a module, which takes a second, and run its `main`; returns the exit status."""
     usual = signal.getsignal(signal.SIGINT)

@@ -21,6 +21,8 @@ TRUTH_TABLES = {
     "regions": ("truth",),
 }
 
+PAPER_SIZE = 9  # demonstrations after which the paper looks at the rank
+
 _PATH_EVERY = 5  # samples of a path between those that its table keeps
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.console import diagnosis_lines, measure_lines, ranking_lines, trial_line
-from experiments.measures import rank_table, ranking_table, truth_tables
+from experiments.measures import PAPER_SIZE, rank_table, ranking_table, truth_tables
 from experiments.settings import Settings
 from experiments.stages import demonstrations, tabular_model
 from experiments.store import Store
@@ -97,6 +97,9 @@ def run_point(
     covered = hypotheses.inside(settings.constraint)
     telling = telling_trial(feasible, phi, covered)
     shown = int(kept[telling]) if feasible.any() else None
+    top = settings.ranks.top
+    ranks = rank_table(settings, phi, violated, reachable, _stream(settings.seed, _SUBSETS, 0))
+    after = ranks[ranks["demonstrations"] == PAPER_SIZE]
     tables = {
         "trials": pd.DataFrame(
             {
@@ -109,9 +112,7 @@ def run_point(
                 "violation_distance_pooled": shares,
             }
         ),
-        "ranks": rank_table(
-            settings, phi, violated, reachable, _stream(settings.seed, _SUBSETS, 0)
-        ),
+        "ranks": ranks,
         "hypotheses": ranking_table(
             hypotheses, phi[reachable], violated, settings.inference.prior
         ).assign(covered_by_truth=covered),
@@ -132,6 +133,8 @@ def run_point(
                     "violation_distance": _mean(each[feasible]),
                     "violation_floor": _mean(floor[feasible]),
                     "violation_distance_pooled": _mean(shares[feasible]),
+                    f"rank_after_{PAPER_SIZE}": after["rank"].median(),
+                    f"share_top_{top}_after_{PAPER_SIZE}": after[f"share_top_{top}"].mean(),
                     "stay": diagnosis.stay,
                     "leave": diagnosis.leave,
                     "cells_crossed": diagnosis.cells_crossed,
@@ -143,7 +146,6 @@ def run_point(
             ]
         ),
     }
-    top = settings.ranks.top
     for line in ranking_lines(tables["hypotheses"], system.space, top):
         log(line)
     summary = tables["summary"].iloc[0]

@@ -6,12 +6,15 @@
    "sources": {hash of the source: points, ...},
    "commits": [git commit, ...], "dirty": whether any had changes,
    "started": [first, last],                     when its points were run
+   "seconds": of all points, "peak_memory_mb": the most of one,
+   "machines": [name, ...], "versions": [package and version, ...],
    "tables": {file: sha256, ...}}}
 """
 
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +41,10 @@ class Collated:
         commits: the git commits that were checked out, where they are known.
         dirty: whether anything differed from them.
         started: when the first and the last point were started, as ISO 8601.
+        seconds: that all points took, one after the other; what points share counts once.
+        peak_memory_mb: the most that the process of one point needed.
+        machines: processor, cores and system of each machine that ran points.
+        versions: of Python and the packages that results depend on, spelt "numpy 2.4.6".
         tables: sha256 of each table, by its file's name.
     """
 
@@ -46,7 +53,40 @@ class Collated:
     commits: tuple[str, ...]
     dirty: bool
     started: tuple[str, str]
+    seconds: float
+    peak_memory_mb: int
+    machines: tuple[str, ...]
+    versions: tuple[str, ...]
     tables: Mapping[str, str]
+
+
+def collated(records: Mapping[str, Mapping[str, Any]], tables: Mapping[str, str]) -> Collated:
+    """What tables came from, of the records of their points.
+
+    Args:
+        records: by identity, in the order of the tables' rows.
+        tables: sha256 of each table, by its file's name.
+    """
+    each = list(records.values())
+    started = [record["started"] for record in each]
+    versions = {
+        f"{package} {version}"
+        for record in each
+        for package, version in {"python": record["python"], **record["packages"]}.items()
+        if version
+    }
+    return Collated(
+        points=tuple(records),
+        sources=dict(sorted(Counter(record["source"] for record in each).items())),
+        commits=tuple(sorted({r["git"]["commit"] for r in each if r["git"]["commit"]})),
+        dirty=any(record["git"]["dirty"] for record in each),
+        started=(min(started), max(started)),
+        seconds=round(sum(record["seconds"]["total"] for record in each), 1),
+        peak_memory_mb=max(record["peak_memory_mb"] for record in each),
+        machines=tuple(sorted({f"{r['cpu']}, {r['cores']} cores, {r['system']}" for r in each})),
+        versions=tuple(sorted(versions)),
+        tables=tables,
+    )
 
 
 @dataclass(frozen=True)
@@ -90,6 +130,10 @@ def read_study(folder: Path) -> Study | None:
             tuple(found["commits"]),
             bool(found["dirty"]),
             (found["started"][0], found["started"][1]),
+            float(found["seconds"]),
+            int(found["peak_memory_mb"]),
+            tuple(found["machines"]),
+            tuple(found["versions"]),
             dict(found["tables"]),
         )
     except FileNotFoundError:

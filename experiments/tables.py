@@ -23,7 +23,7 @@ from experiments.measures import TRUTH_TABLES
 from experiments.schema import plain
 from experiments.settings import Settings
 from experiments.store import digest, replacing
-from experiments.study import Collated, whole_study, write_collated
+from experiments.study import collated, whole_study, write_collated
 
 if TYPE_CHECKING:
     from experiments.record import Point
@@ -111,17 +111,8 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
             written.enter_context(replacing(folder / "tables" / f"{name}.csv")).write(data)
             digests[f"{name}.csv"] = digest(data)
     _forget_others(folder, digests)
-    git = [record["git"] for record in records.values()]
-    started = [record["started"] for record in records.values()]
-    collated = Collated(
-        points=tuple(point.identity for point in ordered),
-        sources={source: len(by_source[source]) for source in sorted(by_source)},
-        commits=tuple(sorted({state["commit"] for state in git if state["commit"]})),
-        dirty=any(state["dirty"] for state in git),
-        started=(min(started), max(started)),
-        tables=digests,
-    )
-    write_collated(folder, collated)
+    records = {point.identity: records[point.identity] for point in ordered}
+    write_collated(folder, collated(records, digests))
     return [folder / "tables" / name for name in sorted(digests)]
 
 

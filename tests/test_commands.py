@@ -18,6 +18,7 @@ COMMANDS = {
     "infer": (["experiments/infer.py", "demonstrations=none"], "hydra"),
     "results": (["experiments/results.py", "status"], "argparse"),
     "figures": (["-m", "paper_figures"], "argparse"),
+    "report": (["-m", "paper_report"], "argparse"),
 }
 
 

@@ -66,7 +66,7 @@ def test_mlci_knows_only_mathematics_and_the_layers_below(path):
     assert inside <= MAY_IMPORT[path.stem]
 
 
-def test_figures_read_results_and_run_nothing():
-    for path in modules("paper_figures"):
+def test_figures_and_report_read_results_and_run_nothing():
+    for path in modules("paper_figures") + modules("paper_report"):
         roots = {name.split(".")[0] for name in imports(path.read_text())}
         assert not roots & {"experiments", "mlci", "hydra", "omegaconf"}, path

@@ -9,7 +9,7 @@ trap 'rm -rf "$work"' EXIT
 # Built from a copy: an old build folder in the checkout would lend the wheel its files.
 mkdir "$work/source" "$work/empty"
 cd "$root"
-cp -r mlci experiments paper_figures conf pyproject.toml README.md LICENSE "$work/source"
+cp -r mlci experiments paper_figures paper_report conf pyproject.toml README.md LICENSE "$work/source"
 "$python" -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir "$work" "$work/source"
 
 "$python" -m venv "$work/venv"
@@ -22,6 +22,7 @@ unset PYTHONPATH
 git init --quiet . # its commits are not those of the code
 mlci-run -m experiment=paper scale=smoke
 mlci-figures smoke
+mlci-report
 mlci-results status smoke | tee "$work/status"
 mlci-results clean
 
@@ -29,6 +30,7 @@ if grep 'not up to date' "$work/status"; then exit 1; fi
 [ "$(ls)" = results ]
 for table in trials ranks summary; do [ -s "results/smoke/tables/$table.csv" ]; done
 [ -s results/smoke/figures/rank_curve.pdf ]
+[ -s results/paper/REPORT.html ]
 python - results/points/*/record.json <<'EOF'
 import json, sys
 import experiments

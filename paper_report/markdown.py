@@ -1,0 +1,61 @@
+"""Pieces of Markdown: numbers with intervals, tables, figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import pandas as pd
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number with some significant digits; a dash where there is none."""
+    if pd.isna(value):
+        return "-"
+    if abs(value) < 5e-4 or abs(value) >= 10**digits:
+        return f"{value:.0f}"
+    return f"{value:#.{digits}g}".rstrip(".")
+
+
+def count(value: float) -> str:
+    """A rank or a count, which may be a half."""
+    return "-" if pd.isna(value) else f"{value:g}"
+
+
+def percent(value: float) -> str:
+    """A share in percent."""
+    return "-" if pd.isna(value) else f"{100 * value:.0f} %"
+
+
+def between(value: str, low: str, high: str) -> str:
+    """A value with its interval in brackets."""
+    return value if "-" in (low, high) else f"{value} [{low.removesuffix(' %')}, {high}]"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]], words: int = 1) -> str:
+    """A table whose first columns, as many as told, hold words, and the others numbers."""
+    lines = [head, ["---"] * words + ["---:"] * (len(head) - words), *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+
+
+def by_dt(rows: pd.DataFrame, show: str) -> str:
+    """A line for each truth and number of cells, a column for each time step.
+
+    Args:
+        rows: truth, cells, dt, and `show`, a text for each.
+        show: the column that is shown.
+    """
+    steps = sorted(rows["dt"].unique())
+    found = {(r.truth, r.cells, r.dt): getattr(r, show) for r in rows.itertuples()}
+    lines = sorted({(truth, cells) for truth, cells, _ in found})
+    return table(
+        ["truth, cells", *(f"dt {dt:g} s" for dt in steps)],
+        [
+            [f"{truth.upper()}, {cells}", *(found.get((truth, cells, dt), "") for dt in steps)]
+            for truth, cells in lines
+        ],
+    )
+
+
+def figure(path: str, caption: str) -> str:
+    """A figure with its caption; the path is relative to the report."""
+    return f"![{caption}]({path})\n"

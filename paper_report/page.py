@@ -1,0 +1,46 @@
+"""The report as one HTML file: Markdown rendered, figures embedded."""
+
+from __future__ import annotations
+
+import base64
+import mimetypes
+import re
+from pathlib import Path
+
+from markdown_it import MarkdownIt
+
+_STYLE = """
+body { max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #1a1a1a }
+body { font: 16px/1.5 system-ui, sans-serif }
+h1, h2, h3 { line-height: 1.2; margin-top: 2.2rem }
+table { border-collapse: collapse; display: block; overflow-x: auto; margin: 1rem 0 }
+table { font-size: 0.85rem }
+th, td { border-bottom: 1px solid #ccc; padding: 0.25rem 0.6rem; vertical-align: top }
+thead th { border-bottom: 2px solid #666 }
+code { font-size: 0.9em; background: #f3f3f3; padding: 0 0.2em }
+img { max-width: 100%; display: block; margin: 1rem 0 }
+"""
+
+
+def html(markdown: str, folder: Path) -> str:
+    """Render a report.
+
+    Args:
+        markdown: its text.
+        folder: what the paths of its figures are relative to.
+    """
+    body = MarkdownIt("commonmark", {"html": False}).enable("table").render(markdown)
+    body = re.sub(r'<img src="([^"]+)"', lambda found: _embedded(found[1], folder), body)
+    title = markdown.partition("\n")[0].lstrip("# ")
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+    )
+
+
+def _embedded(path: str, folder: Path) -> str:
+    """The beginning of an image's tag, its file in it."""
+    data = base64.b64encode((folder / path).read_bytes()).decode()
+    kind = mimetypes.guess_type(path)[0]
+    return f'<img src="data:{kind};base64,{data}"'
