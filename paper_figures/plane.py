@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,8 +61,8 @@ class Plane:
         return points
 
     def cells(self, axes: Axes, boxes: pd.DataFrame, **style: Any) -> PatchCollection:
-        """Draw boxes, which may be coloured by `array`; the edges thin."""
-        patches = self.rectangles(boxes)
+        """Draw boxes, their edges thin, coloured by `array` if one is given."""
+        patches = self.rectangles(boxes) if "array" in style else self.regions(boxes)
         drawn = PatchCollection(patches, **{"edgecolor": EDGE, "linewidth": 0.3, **style})
         axes.add_collection(drawn)
         return drawn
@@ -72,16 +73,7 @@ class Plane:
         for column, dimension in enumerate((self.x, self.y)):
             if dimension["periodic"]:
                 period = dimension["upper"] - dimension["lower"]
-                shift = np.where(np.arange(2) == column, period, 0.0)
-                found = [
-                    Rectangle(tuple(corner), box.get_width(), box.get_height())
-                    for box in found
-                    for turns in (-1, 0, 1)
-                    for corner in [np.array(box.get_xy()) + turns * shift]
-                    if corner[column] < dimension["upper"]
-                    and corner[column] + (box.get_width(), box.get_height())[column]
-                    > dimension["lower"]
-                ]
+                found = [copy for box in found for copy in _copies(box, column, dimension, period)]
         return found
 
     def beside(self, box: Rectangle, other: Rectangle) -> Rectangle:
@@ -108,6 +100,20 @@ class Plane:
                 and np.isclose(turn, 2 * np.pi)
             ):
                 axis.set_ticks([turn * share for share in _TURN_TICKS], list(_TURN_TICKS.values()))
+
+
+def _copies(
+    box: Rectangle, column: int, dimension: pd.Series, period: float
+) -> Iterator[Rectangle]:
+    """A box and those of its copies, a period before and after, that reach into the bounds."""
+    size = (box.get_width(), box.get_height())
+    slack = 1e-9 * period
+    for turns in (0, -1, 1):
+        corner = list(box.get_xy())
+        corner[column] += turns * period
+        inside = corner[column] < dimension["upper"] - slack
+        if inside and corner[column] + size[column] > dimension["lower"] + slack:
+            yield Rectangle(tuple(corner), *size)
 
 
 def centre(box: Rectangle) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -44,7 +43,10 @@ def table_of(point: Point, name: str) -> pd.DataFrame:
     return pd.read_csv(point.folder / f"{name}.csv")
 
 
-def test_example_is_the_point_nearest_to_the_papers(points: list[Point]) -> None:
+def test_example_is_the_point_nearest_to_the_papers(
+    points: list[Point], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(examples, "_PATH_EVERY", 3)  # leaves out the last of 17 samples
     tables = example_tables(points)
     (example,) = (p for p in points if p.settings.grid.shape == (24, 12) and p.settings.dt == 0.25
                   and p.settings.seed == 0)  # fmt: skip
@@ -62,7 +64,7 @@ def test_example_is_the_point_nearest_to_the_papers(points: list[Point]) -> None
     paths, shown = table_of(example, "paths"), tables["example_paths"]
     ends = [(path["time"].min(), path["time"].max()) for _, path in paths.groupby("demonstration")]
     assert ends == [(p["time"].min(), p["time"].max()) for _, p in shown.groupby("demonstration")]
-    assert len(shown) < 0.6 * len(paths)
+    assert len(shown) / len(paths) == 7 / 17
     every = paths.merge(shown, on=["demonstration", "time"], suffixes=("", "_shown"))
     assert len(every) == len(shown)
     np.testing.assert_allclose(every["position"], every["position_shown"], atol=5.1e-5)
@@ -115,7 +117,7 @@ def test_compared_trial_is_feasible_in_all_grids_and_passes_nearest(points: list
 
 
 def test_time_step_is_one_at_which_nearly_all_can_be_followed(
-    points: list[Point], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    points: list[Point], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def dts() -> set[float]:
         return set(example_tables(points)["compared_cells"]["dt"])
@@ -128,10 +130,15 @@ def test_time_step_is_one_at_which_nearly_all_can_be_followed(
         )
         for dt in (0.25, 0.5)
     }
-    assert counts[0.25] < counts[0.5]
+    assert 0 < counts[0.25] < counts[0.5]
     assert dts() == {0.5}
     monkeypatch.setattr(examples, "_ENOUGH", 0.0)
     assert dts() == {0.25}
+    (trial,) = example_tables(points)["compared_cells"]["trial"].unique()
+    for point in points:
+        if point.settings.dt == 0.25 and point.settings.grid.shape != SHAPES[1]:
+            trials = table_of(point, "trials").set_index("trial")
+            assert trials["feasible"][trial]
 
 
 def test_order_of_points_does_not_matter_and_truths_stand_apart(points: list[Point]) -> None:

@@ -29,7 +29,7 @@ from paper_figures import (
     violation_distance,
 )
 from paper_figures.selection import Unsuited
-from paper_figures.style import CELL_COLOURS, CELL_MARKS, DEMONSTRATION, SAMPLED, TRUTH
+from paper_figures.style import CELL_COLOURS, CELL_MARKS, DEMONSTRATION, GOAL, SAMPLED, START, TRUTH
 
 PAPER = Path(__file__).parents[1] / "results" / "paper" / "tables"
 HAS_EXAMPLES = (PAPER / "example_ranking.csv").is_file()
@@ -232,9 +232,9 @@ def test_trajectories_show_visited_cells_and_violations(study: str) -> None:
         np.testing.assert_allclose(there[:, 0], path[names[0]] % (2 * np.pi), atol=1e-12)
         np.testing.assert_allclose(there[:, 1], path[names[1]])
         ends = visited.sort_values("step").iloc[[0, -1]]
-        outlines = [patch.get_xy() for patch in axes.patches]
-        for corner in corners(ends)[:, :2]:
-            assert any(corner == pytest.approx(xy) for xy in outlines)
+        outlines = {to_hex(patch.get_edgecolor()): patch.get_xy() for patch in axes.patches}
+        assert outlines[START] == pytest.approx(corners(ends)[0, :2])
+        assert outlines[GOAL] == pytest.approx(corners(ends)[1, :2])
         assert f"{visited['cell'].nunique()} cells visited" in said
 
 

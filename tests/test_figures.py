@@ -154,18 +154,24 @@ def test_every_file_tells_its_origin(tmp_path: Path) -> None:
 def test_a_figure_without_its_table_stays_listed_and_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_tables(tmp_path, STATE_SPACE)
+    write_tables(tmp_path, {**STATE_SPACE, "rank_curve": curve_rows()})
     with pytest.raises(Unsuited, match=r"run the study first, python .* experiment=empty"):
         draw_study(tmp_path / "empty")
-    assert [path.name for path in draw_study(tmp_path)] == ["state_space.png"]
+    drawn = [path.name for path in draw_study(tmp_path)]
+    assert drawn == ["state_space.png", "rank_curve.png"]
     assert capsys.readouterr().out == ""
+    (tmp_path / "tables" / "rank_curve.csv").unlink()
+    assert [path.name for path in draw_study(tmp_path)] == ["state_space.png"]
+    told = f"{tmp_path.name}: not drawn again: rank_curve: there is no table rank_curve\n"
+    assert capsys.readouterr().out == told
+    assert concerns(tmp_path) == {
+        "rank_curve": ["table rank_curve.csv is missing"],
+        "state_space": [],
+    }
     table = tmp_path / "tables" / "example_regions.csv"
     table.write_text(STATE_SPACE["example_regions"].drop(columns="region").to_csv(index=False))
     with pytest.raises(Unsuited, match="table example_regions has no column region"):
         draw_study(tmp_path)
-    assert "not drawn again: state_space: table example_regions has no" in capsys.readouterr().out
-    table.unlink()
-    assert concerns(tmp_path)["state_space"] == ["table example_regions.csv is missing"]
 
 
 def test_figures_share_only_the_modules_that_their_freshness_depends_on() -> None:
