@@ -30,7 +30,8 @@ COMPARED = (100, 900, 1600)
 _MOST_TRUTHS = 4  # of a study that has examples: of more, they would be neither few nor small
 _ENOUGH = 0.9  # of the demonstrations are feasible in all compared grids at a dt that can be chosen
 _PATH_EVERY = 2  # samples of the table `paths` between those that are drawn of many paths
-_DECIMALS = 4  # of coordinates that are only drawn
+_DECIMALS = 4  # of paths, which are only drawn
+_CORNER_DECIMALS = 6  # of boxes, likewise, whose edges meet
 
 
 def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
@@ -174,7 +175,7 @@ def _grid_boxes(grid: Grid) -> pd.DataFrame:
 
 def _with_boxes(rows: pd.DataFrame, key: str, boxes: pd.DataFrame) -> pd.DataFrame:
     """Rows with the corners of the box that their column `key` numbers, as they are drawn."""
-    return rows.join(boxes.round(_DECIMALS), on=key)
+    return rows.join(boxes.round(_CORNER_DECIMALS), on=key)
 
 
 def _of_trial(table: pd.DataFrame, trial: int, column: str = "trial") -> pd.DataFrame:

@@ -48,7 +48,8 @@ def draw_curves(axes: Axes, rows: pd.DataFrame) -> None:
     for number, (cells, curve) in enumerate(groups):
         x = curve["dt"] * (1 + _ASIDE * (number - (len(groups) - 1) / 2))
         style = mark(int(cells), number)
-        axes.plot(x, curve["mean"], color=style["color"], label=f"{cells} cells")
+        firm = curve["mean"].where(curve["reachable"] >= _REACHED)
+        axes.plot(x, firm, color=style["color"], label=f"{cells} cells")
         for few, part in curve.groupby(curve["reachable"] < _REACHED):
             axes.errorbar(
                 x[part.index],
@@ -98,7 +99,7 @@ def shown_facts(rows: pd.DataFrame) -> Iterator[str]:
     )
     yield f"Uncertainty: bars are 95 % {how}."
     yield (
-        f"Pale: the tabular agent reaches fewer than {100 * _REACHED:.0f} % of the goals, and the "
-        "mean is over those alone. No mark: it reaches none."
+        f"Pale, and not joined: the tabular agent reaches fewer than {100 * _REACHED:.0f} % of the "
+        "goals, and the mean is over those alone. No mark: it reaches none."
     )
     yield "Marks are moved a little aside of their dt, so that no bar hides another."

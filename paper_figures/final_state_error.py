@@ -33,8 +33,8 @@ def draw(measures: pd.DataFrame) -> Figure:
     with plt.rc_context(RC):
         for truth, axes in zip(truths, grid[:, 0], strict=True):
             draw_curves(axes, rows[rows["truth"] == truth])
-            axes.set_ylim(bottom=0)
             axes.set_title(f"truth {truth.upper()}", loc="left")
+        grid[0, 0].set_ylim(bottom=0)  # last: it ends the scaling to the data
         figure.supylabel("final-state error [share of the ranges]", fontsize=8)
         grid[-1, 0].set_xlabel(r"$\Delta t$ [s]")
         figure.legend(handles=legend_entries(rows), loc="outside lower center", ncols=4)

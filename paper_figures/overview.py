@@ -162,7 +162,7 @@ def _draw_moves(axes: Axes, visits: pd.DataFrame, moves: pd.DataFrame, plane: Pl
     place = dict(zip(first["cell"], visited, strict=True))
     begins = [place[cell] for cell in shown["cell"]]
     ends = [plane.beside(*pair) for pair in zip(plane.rectangles(after), begins, strict=True)]
-    for box in visited:
+    for box in {box.get_xy(): box for box in visited}.values():
         box.set(facecolor=SAMPLED, alpha=0.45, linewidth=0)
         axes.add_patch(box)
     arrow = {"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0, "mutation_scale": 5}

@@ -67,6 +67,11 @@ class Plane:
         axes.add_collection(drawn)
         return drawn
 
+    def shadows(self, boxes: pd.DataFrame) -> pd.DataFrame:
+        """One box of each place in the plane: those of further dimensions lie on one another."""
+        corner = [f"lower_{dimension['name']}" for dimension in (self.x, self.y)]
+        return boxes.drop_duplicates(corner)
+
     def regions(self, boxes: pd.DataFrame) -> list[Rectangle]:
         """Each box, and its copies where it leaves a periodic dimension on one side."""
         found = self.rectangles(boxes)
@@ -107,7 +112,7 @@ def _copies(
 ) -> Iterator[Rectangle]:
     """A box and those of its copies, a period before and after, that reach into the bounds."""
     size = (box.get_width(), box.get_height())
-    slack = 1e-9 * period
+    slack = 1e-5 * period  # tables round corners
     for turns in (0, -1, 1):
         corner = list(box.get_xy())
         corner[column] += turns * period

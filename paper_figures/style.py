@@ -29,7 +29,7 @@ START, GOAL = "#56b4e9", "#009e73"
 GAIN, CHANCE = "YlGnBu", "PuRd"  # one colour each, dark for much: a hypothesis's gain and its Phi
 PATH = "#444444"  # of demonstrations among many
 EDGE = "#b0b0b0"  # between hypotheses
-VIOLATED = "#f1f1f1"  # hypotheses that some demonstration violates
+VIOLATED = "#e8e8e8"  # hypotheses that some demonstration violates
 GUIDE = "#888888"  # lines that help the eye
 
 RC = {

@@ -126,7 +126,7 @@ def facts(
 
 def _draw_visits(axes: Axes, visited: pd.DataFrame, plane: Plane) -> None:
     """Visited cells shaded, each once; the first and the last outlined."""
-    once = visited.drop_duplicates("cell")
+    once = plane.shadows(visited)
     plane.cells(axes, once, facecolor=SAMPLED, edgecolor=SAMPLED, alpha=0.45, zorder=2)
     ends = plane.rectangles(visited.sort_values("step").iloc[[0, -1]])
     for box, colour in zip(ends, (START, GOAL), strict=True):

@@ -45,8 +45,8 @@ def draw(measures: pd.DataFrame) -> Figure:
         for (name, what), panels in zip(_PANELS.items(), grid, strict=True):
             for truth, axes in zip(truths, panels, strict=True):
                 draw_curves(axes, each[name][each[name]["truth"] == truth])
-                axes.set_ylim(bottom=0)
                 axes.set_title(f"truth {truth.upper()}, {what}", loc="left")
+            panels[0].set_ylim(bottom=0)  # last: it ends the scaling to the data
             panels[0].set_ylabel("distance [regions]")
         for axes in grid[-1]:
             axes.set_xlabel(r"$\Delta t$ [s]")

@@ -92,7 +92,15 @@ def assert_curves(axes: Axes, rows: pd.DataFrame) -> None:
             there = [row.low, row.high] if not np.isnan(row.mean) else []
             assert segment.reshape(-1, 2)[:, 1].tolist() == pytest.approx(there)
             assert (line.get_alpha() < 1) == (row.reachable < 0.5)
+        low, high = axes.get_ylim()
+        assert low == 0
+        assert high > rows["high"][rows["cells"] == cells].max()
     assert sorted(seen) == sorted(rows.index)
+    for line in axes.lines:
+        if line.get_label().endswith(" cells"):
+            of_line = rows[rows["cells"] == int(line.get_label().split()[0])]
+            joined = of_line["mean"].where(of_line["reachable"] >= 0.5)
+            np.testing.assert_allclose(line.get_ydata(), joined)
 
 
 def measure_rows(study: str, measure: str) -> pd.DataFrame:
@@ -276,7 +284,8 @@ def test_overview_is_one_run_from_demonstrations_to_ranks(study: str) -> None:
     best = feasible[(feasible["rank"] <= 5) & (feasible["gain"] > 0)]
     assert [text.get_text() for text in ranks.texts] == [f"{rank:g}" for rank in best["rank"]]
     first = visits.sort_values("step").head(6)
-    assert len([p for p in moves.patches if to_hex(p.get_facecolor()) == SAMPLED]) == len(first)
+    shaded = [patch for patch in moves.patches if to_hex(patch.get_facecolor()) == SAMPLED]
+    assert len(shaded) == first["cell"].nunique()
     every = of_c1["example_moves"]
     away = every[every["cell"].isin(first["cell"]) & (every["cell"] != every["successor"])]
     taken = (first["cell"].to_numpy()[1:] != first["cell"].to_numpy()[:-1]).sum()
