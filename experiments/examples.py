@@ -115,19 +115,21 @@ def _comparison(example: Point, points: Sequence[Point]) -> tuple[int, list[Poin
     example's at which nearly all demonstrations are feasible in all of these grids, or, where
     there is none, the most. The trial is the one of them that passes nearest to the truth.
     """
-    choices = []
-    for dt in sorted({point.settings.dt for point in points}, key=lambda dt: abs(dt - DT)):
-        settings = replace(example.settings, dt=dt)
-        same = [
-            point for point in points if replace(point.settings, grid=settings.grid) == settings
-        ]
-        if same:
-            closest = [min(same, key=lambda p: abs(_count(p) - cells)) for cells in COMPARED]
-            alike = list({point.identity: point for point in closest}.values())
-            choices.append((_feasible_in_all(alike), alike))
-    demonstrations = len(_read(example, "trials"))
-    enough = [choice for choice in choices if len(choice[0]) >= _ENOUGH * demonstrations]
-    trials, alike = enough[0] if enough else max(choices, key=lambda choice: len(choice[0]))
+    own = example.settings
+    by_dt: dict[float, list[Point]] = {}
+    for point in points:
+        if replace(point.settings, grid=own.grid, dt=own.dt) == own:
+            by_dt.setdefault(point.settings.dt, []).append(point)
+    enough = _ENOUGH * len(_read(example, "trials"))
+    trials, alike = np.empty(0, dtype=np.int64), [example]
+    for dt in sorted(by_dt, key=lambda dt: (abs(dt - own.dt), dt)):
+        closest = [min(by_dt[dt], key=lambda p: abs(_count(p) - cells)) for cells in COMPARED]
+        these = list({point.identity: point for point in closest}.values())
+        found = _feasible_in_all(these)
+        if len(found) > len(trials):
+            trials, alike = found, these
+        if len(trials) >= enough:
+            break
     paths = _read(example, "paths")
     paths = paths[paths["demonstration"].isin(trials)]
     names = list(example.settings.model.space.names)

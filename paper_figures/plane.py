@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.patches import Rectangle
 
+from paper_figures.selection import Unsuited
 from paper_figures.style import EDGE
 
 _TURN_TICKS = {0.0: "0", 0.25: r"$\pi/2$", 0.5: r"$\pi$", 0.75: r"$3\pi/2$", 1.0: r"$2\pi$"}
@@ -31,7 +32,13 @@ class Plane:
 
     @classmethod
     def of(cls, boxes: pd.DataFrame, dimensions: pd.DataFrame) -> Plane:
-        """The first two dimensions that boxes bound, or, where they bound one, that and another."""
+        """The first two dimensions that boxes bound, or, where they bound one, that and another.
+
+        Raises:
+            Unsuited: the state has but one.
+        """
+        if len(dimensions) < 2:
+            raise Unsuited("a state of one dimension has no plane")
         free = [not np.isfinite(boxes[f"lower_{name}"]).any() for name in dimensions["name"]]
         order = np.argsort(free, kind="stable")[:2]
         return cls(*(dimensions.iloc[place] for place in sorted(order)))

@@ -66,6 +66,13 @@ def test_many_truths_and_none_to_rank_are_not_drawn() -> None:
         rank_curve.draw(curve_rows().assign(median=np.nan))
 
 
+def test_one_dimension_has_no_plane() -> None:
+    tables = of_c1(hypothesis_map)
+    tables["example_dimensions"] = tables["example_dimensions"].head(1)
+    with pytest.raises(Unsuited, match="a state of one dimension has no plane"):
+        hypothesis_map.draw(**tables)
+
+
 def test_what_does_not_vary_is_no_curve() -> None:
     rows = measure_rows()
     with pytest.raises(Unsuited, match="neither cells nor dt varies"):
