@@ -47,7 +47,7 @@ _POSITIVE = (
     "recorded_dt",
     "dts",
 )
-_NOT_NEGATIVE = ("seed", "safety.margin", "safety.width", "truth.cell")
+_NOT_NEGATIVE = ("seed", "safety.margin", "safety.width", "truth.cell", "calibration.sets")
 _AT_LEAST_ONE = (
     "rollouts",
     "transition.samples",
@@ -58,6 +58,7 @@ _AT_LEAST_ONE = (
     "ranks.demonstrations",
     "ranks.subsets",
     "ranks.top",
+    "calibration.demonstrations",
     "grid.shape",
     "safety.shape",
     "hypotheses.shape",
@@ -311,6 +312,11 @@ def truth_problems(settings: Settings) -> Iterator[str]:
         return
     if math.prod(settings.safety.shape) > _MOST_ENTRIES:
         yield f"safety.shape: {list(settings.safety.shape)} makes too many values; use fewer"
+    if settings.calibration.sets and settings.truth.boxes:
+        yield (
+            f"calibration.sets: {settings.calibration.sets}, but the prior knows no such truth; "
+            "take truth=none or truth=cell, or 0 sets"
+        )
     constraint = settings.constraint
     if len(constraint) and not np.any(settings.candidates.inside(constraint)):
         yield (

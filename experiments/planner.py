@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
 from hydra.core.plugins import Plugins
 from hydra.errors import HydraException
 from hydra.plugins.sweeper import Sweeper
@@ -39,7 +40,8 @@ class Planner(Sweeper):
     Attributes:
         params: values that an experiment sweeps, by key: "1,2,3".
         cases: lists of overrides that go together, such as [actions=9, seed=1]; [] changes nothing.
-        ends: of each of the params take the first and the last value only, and say so.
+            Where one of them has several values, so has the case.
+        ends: of several values take the first and the last only, and say so.
 
     Raises:
         ValueError: cases that are not lists of overrides.
@@ -98,36 +100,31 @@ class Planner(Sweeper):
     def _jobs(self, arguments: list[str]) -> list[list[str]]:
         """The overrides of every point; the command line wins over the experiment's own."""
         parser = OverridesParser.create(config_loader=self._loader)
-        given = {override.key_or_group for override in parser.parse_overrides(arguments)}
-        cases = [self._read_case(i, parser, given) for i in range(len(self.cases))]
+        typed = parser.parse_overrides(arguments)
+        given = {override.key_or_group for override in typed}
         values: dict[str, list[str]] = {}
-        shortened: dict[str, str] = {}
+        shortened: list[str] = []
         own = [quote_options(f"{key}={swept}") for key, swept in self.params.items()]
-        for override in parser.parse_overrides([*own, *arguments]):
-            key, name = override.get_key_element(), override.key_or_group
-            shortened.pop(key, None)
-            if not override.is_sweep_override():
-                values[key] = [f"{key}={override.get_value_element_as_str()}"]
-            elif name in _NOT_SWEPT:
-                raise ConfigError(f"{override.input_line}: {_NOT_SWEPT[name]}")
-            elif not override.is_discrete_sweep():
-                raise ConfigError(f"{override.input_line}: cannot be swept; list its values")
-            else:
-                each = list(override.sweep_string_iterator())
-                if not each:
-                    raise ConfigError(f"{override.input_line}: there is no value to sweep")
-                if self.ends and override.input_line in own and len(each) > 2:
-                    shortened[key] = f"{each[0]} and {each[-1]} stand for all of {', '.join(each)}"
-                    each = [each[0], each[-1]]
-                values[key] = [quote_options(f"{key}={value}") for value in each]
-        for key, what in shortened.items():
-            print(f"{key}: {what}")
+        for override in parser.parse_overrides(own):
+            if override.key_or_group not in given:
+                values[override.get_key_element()] = self._own_values(override, shortened)
+        for override in typed:
+            values[override.get_key_element()] = _values(override)
+        cases = [
+            list(case)
+            for i in range(len(self.cases))
+            for case in self._read_case(i, parser, given, shortened)
+        ]
+        for line in dict.fromkeys(shortened):
+            print(line)
         return [[*job, *case] for job in itertools.product(*values.values()) for case in cases]
 
-    def _read_case(self, i: int, parser: OverridesParser, given: set[str]) -> list[str]:
-        """The overrides of a case, without those whose keys the command line gives."""
+    def _read_case(
+        self, i: int, parser: OverridesParser, given: set[str], shortened: list[str]
+    ) -> Iterator[tuple[str, ...]]:
+        """The points of a case, without the keys that the command line gives."""
         swept = {word.lstrip("+~") for word in self.params}
-        found: dict[str, str] = {}
+        found: dict[str, list[str]] = {}
         for word in self.cases[i]:
             where = f"hydra.sweeper.cases[{i}]: {word}"
             try:
@@ -135,16 +132,25 @@ class Planner(Sweeper):
             except HydraException:
                 raise ConfigError(f"{where} cannot be read as key=value") from None
             name = override.key_or_group
-            if override.is_sweep_override():
-                raise ConfigError(f"{where} has several values; write a case for each of them")
             if name in _NOT_SWEPT:
                 raise ConfigError(f"{where}: {_NOT_SWEPT[name]}")
             if name in found:
                 raise ConfigError(f"{where} is the second value of {name} in this case; keep one")
             if name in swept:
                 raise ConfigError(f"{where}: params sweep {name} too; leave it to one of them")
-            found[name] = quote_options(word)
-        return [word for name, word in found.items() if name not in given]
+            found[name] = [] if name in given else self._own_values(override, shortened)
+        return itertools.product(*(values for name, values in found.items() if name not in given))
+
+    def _own_values(self, override: Override, shortened: list[str]) -> list[str]:
+        """What an experiment gives a key, or the ends of it; notes what the ends stand for."""
+        each = _values(override)
+        if self.ends and len(each) > 2:
+            every = ", ".join(override.sweep_string_iterator())
+            first, *_, last = override.sweep_string_iterator()
+            key = override.get_key_element()
+            shortened.append(f"{key}: {first} and {last} stand for all of {every}")
+            each = [each[0], each[-1]]
+        return each
 
     def _plan(self, jobs: Sequence[Sequence[str]]) -> tuple[list[Planned], StudySettings]:
         """Compose and check every point; of equal ones the first stays."""
@@ -172,6 +178,21 @@ class Planner(Sweeper):
             self._launcher.names = {planned.job: planned.name for planned in plan.values()}
             self._launcher.composed = trees  # composing costs 0.1 s a point
         return list(plan.values()), study
+
+
+def _values(override: Override) -> list[str]:
+    """The overrides that one with several values stands for."""
+    key, name = override.get_key_element(), override.key_or_group
+    if not override.is_sweep_override():
+        return [f"{key}={override.get_value_element_as_str()}"]
+    if name in _NOT_SWEPT:
+        raise ConfigError(f"{override.input_line}: {_NOT_SWEPT[name]}")
+    if not override.is_discrete_sweep():
+        raise ConfigError(f"{override.input_line}: cannot be swept; list its values")
+    each = [quote_options(f"{key}={value}") for value in override.sweep_string_iterator()]
+    if not each:
+        raise ConfigError(f"{override.input_line}: there is no value to sweep")
+    return each
 
 
 def _read_cases(cases: object) -> list[list[str]]:

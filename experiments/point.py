@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
+from experiments.calibration import Shown, calibration_table
 from experiments.console import diagnosis_lines, measure_lines, ranking_lines, trial_line
 from experiments.measures import PAPER_SIZE, rank_table, ranking_table, truth_tables
 from experiments.settings import Settings
@@ -42,7 +43,7 @@ def run_point(
         demonstrations; `hypotheses`, a row a hypothesis, ranked with all of them; `summary`, one
         row; `sampled`, `violations`, `moves` and `probabilities`, of single trajectories; and the
         TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`, `dimensions` of the state,
-        and `regions` of the truth.
+        and `regions` of the truth. If asked for, `calibration`.
     """
     trials = demonstrations(settings, store)
     kept = trials.kept(settings.demonstrations.keep)
@@ -146,6 +147,9 @@ def run_point(
             ]
         ),
     }
+    if settings.calibration.sets:
+        own = Shown(phi, violated, reachable)
+        tables["calibration"] = calibration_table(settings, mdp, count, own)
     for line in ranking_lines(tables["hypotheses"], system.space, top):
         log(line)
     summary = tables["summary"].iloc[0]

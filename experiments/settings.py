@@ -131,6 +131,14 @@ class InferenceSettings:
 
 
 @dataclass(frozen=True)
+class CalibrationSettings:
+    """Sets of demonstrations of a simulated world, and how many of each set are seen."""
+
+    sets: int
+    demonstrations: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class RankSettings:
     """Ranks of the truth over random subsets of 1 .. `demonstrations` demonstrations."""
 
@@ -191,6 +199,7 @@ class Settings(ModelSettings):
     demonstrations: DemonstrationSettings
     safety: SafetySettings
     ranks: RankSettings
+    calibration: CalibrationSettings
     rollouts: int
     seed: int
 
@@ -285,6 +294,7 @@ class StudySettings:
     """Where and how points run: it changes no result, so it is no part of a point's identity."""
 
     study: str
+    case: str | None
     results: str | None
     workers: int | None
     sweep: SweepSettings

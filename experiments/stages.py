@@ -96,7 +96,7 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
         trials = sample_trials(
             system,
             omega,
-            _task_box(settings),
+            task_box(settings),
             trials=chosen.pairs,
             seed=settings.seed,
             horizon=settings.horizon,
@@ -194,7 +194,7 @@ def _corners(regions: ConstraintSet) -> list[list[str]]:
     return [[repr(float(side)) for side in box] for box in sides]
 
 
-def _task_box(settings: Settings) -> Box:
+def task_box(settings: Settings) -> Box:
     """Where starts and goals are drawn; a free dimension spans the state space."""
     box, bounds = settings.tasks.box(), settings.model.space.bounds
     return Box(

@@ -18,8 +18,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import pandas as pd
 
 from experiments.aggregate import study_tables
+from experiments.cases import case_table
 from experiments.examples import example_tables
 from experiments.measures import TRUTH_TABLES
+from experiments.reliability import reliability
 from experiments.schema import plain
 from experiments.settings import Settings
 from experiments.store import digest, replacing
@@ -106,7 +108,15 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
             digests[name] = _join(file, name, first, extra, flat)
             file.flush()
             joined[Path(name).stem] = Path(file.name)
-        for name, frame in {**example_tables(ordered), **study_tables(joined)}.items():
+        whole = {**example_tables(ordered), **study_tables(joined)}
+        if "calibration" in joined:
+            whole["reliability"] = reliability(pd.read_csv(joined["calibration"]))
+        plan = whole_study(folder)
+        listed = [point.identity for point in ordered]
+        cases = case_table(joined["summary"], listed, plan.points if plan else {})
+        if cases is not None:
+            whole["cases"] = cases
+        for name, frame in whole.items():
             data = csv_bytes(frame)
             written.enter_context(replacing(folder / "tables" / f"{name}.csv")).write(data)
             digests[f"{name}.csv"] = digest(data)

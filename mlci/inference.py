@@ -140,3 +140,23 @@ def confidence(prior: float, phi: ArrayLike) -> float:
         return 0.0
     coincidence = float(np.exp(-np.sum(log_likelihood_gain(phi))))
     return prior / (prior + (1 - prior) * coincidence)
+
+
+def printed_confidence(prior: float, phi: ArrayLike) -> float:
+    """(12) as it is printed: p / (p - (1 - p) prod_j (1 - Phi^j)); wrong, for comparison only.
+
+    It exceeds 1 wherever it is positive, grows without bound as the product comes near p / (1 - p),
+    and is negative beyond. `confidence` is what must be meant.
+
+    Args:
+        prior: p, the probability that the constraint is there.
+        phi: (N,) its violation probability for each demonstration.
+
+    Returns:
+        What the formula gives; infinite where it divides by 0.
+    """
+    if not 0 <= prior <= 1:
+        raise ValueError(f"a prior probability lies in [0, 1], not {prior}")
+    coincidence = float(np.exp(-np.sum(log_likelihood_gain(phi))))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.float64(prior) / (prior - (1 - prior) * coincidence))

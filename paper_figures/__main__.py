@@ -18,10 +18,13 @@ from types import ModuleType
 import pandas as pd
 
 from paper_figures import (
+    calibration,
     final_state_error,
     hypothesis_map,
+    in_cell,
     overview,
     rank_curve,
+    sensitivity,
     state_space,
     trajectories,
     violation_distance,
@@ -43,6 +46,9 @@ FIGURES: tuple[ModuleType, ...] = (
     rank_curve,
     trajectories,
     hypothesis_map,
+    in_cell,
+    sensitivity,
+    calibration,
 )
 
 

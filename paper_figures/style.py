@@ -20,6 +20,9 @@ PAGE = 7.0  # of two columns and what is between them [in]
 # Okabe and Ito, which is safe for the colour-blind; its marks beside them, legible in grey.
 CELL_MARKS = {100: "o", 400: "x", 900: "s", 1600: "^"}
 CELL_COLOURS = {100: "#cc79a7", 400: "#009e73", 900: "#d9a400", 1600: "#0072b2"}
+# Another four, from light to dark, for numbers of demonstrations.
+STEP_MARKS = ("o", "s", "^", "D")
+STEP_COLOURS = ("#56b4e9", "#009e73", "#d55e00", "#000000")
 OTHER_MARKS = ("D", "v", "P", "*")
 OTHER_COLOURS = ("#000000", "#d55e00", "#56b4e9", "#7f7f7f")
 TRUTH = "#d55e00"

@@ -178,6 +178,13 @@ WRONG = [
     ("truth.boxes=[]", "truth.boxes: [] is empty; give at least one box, with lower and upper, or"),
     ("truth.name=none", "truth.name: none means that nothing is forbidden; take another name"),
     ("truth.cell=37", "truth.cell: 37 and 1 boxes are given; keep one of them"),
+    ("calibration.sets=-1", "calibration.sets: -1 must not be below 0"),
+    (
+        "calibration.sets=2",
+        "calibration.sets: 2, but the prior knows no such truth; take",
+    ),
+    ("calibration.demonstrations=[]", "calibration.demonstrations: [] is empty"),
+    ("calibration.demonstrations=[0]", "calibration.demonstrations: [0] must be at least 1"),
     ("truth.cell=-1", "truth.cell: -1 must not be below 0"),
     ("grid.offset=[0.5]", "grid.offset: [0.5] must have 2 entries, one each for angle"),
     ("grid.offset=[1,0]", "grid.offset: [1.0, 0.0] must be shares of a cell, from 0 to below 1"),
@@ -294,7 +301,7 @@ def test_all_wrong_points_of_a_sweep_are_reported_at_once(
         (["-m", f"{CASES}[[],seed]"], "hydra.sweeper: cases[1]: 'seed' is no list of overrides, s"),
         (["-m", f"{CASES}[[3]]"], "hydra.sweeper: cases[0]: [3] is no list of overrides, such as"),
         (["-m", f"{CASES}[[],[seed]]"], "sweeper.cases[1]: seed cannot be read as key=value"),
-        (["-m", f"{CASES}[['seed=1,2']]"], "cases[0]: seed=1,2 has several values; write a case"),
+        (["-m", f"{CASES}[['dt=interval(0,1)']]"], "dt=interval(0,1): cannot be swept; list its"),
         (["-m", f"{CASES}[['study=x']]"], "cases[0]: study=x: this changes no result, so give"),
         (["-m", f"{CASES}[['seed=1','seed=2']]"], "cases[0]: seed=2 is the second value of seed"),
         (

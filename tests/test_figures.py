@@ -6,12 +6,15 @@ import hashlib
 import importlib
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from choice_studies import known_tables
 from figure_study import curve_rows, measure_rows, path_rows, study_tables
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
@@ -24,10 +27,18 @@ from paper_figures.origin import SHARED, concerns
 from paper_figures.selection import Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, COLUMN, PAGE, TRUTH, save
 
+CHOICES = known_tables()
+
+
+def tables_for(module: ModuleType) -> dict[str, pd.DataFrame]:
+    """The known tables that a module needs."""
+    known = {**study_tables(), **CHOICES.get(module.__name__.rpartition(".")[2], {})}
+    return {name: known[name] for name in module.TABLES}
+
 
 def of_c1(module: ModuleType) -> dict[str, pd.DataFrame]:
     """The rows of one truth in the tables that a module needs."""
-    tables = {name: study_tables()[name] for name in module.TABLES}
+    tables = tables_for(module)
     return {
         name: table[table["truth"] == "c1"].reset_index(drop=True) for name, table in tables.items()
     }
@@ -104,7 +115,8 @@ def test_a_study_is_drawn_from_its_tables_alone(tmp_path: Path) -> None:
     digests = write_tables(tmp_path, study_tables())
     drawn = draw_study(tmp_path)
     names = {path.stem for path in drawn}
-    single = {module.__name__.rpartition(".")[2] for module in FIGURES} - {"hypothesis_map"}
+    single = {module.__name__.rpartition(".")[2] for module in FIGURES}
+    single -= {"hypothesis_map", *CHOICES}
     assert names == single | {"hypothesis_map_c1", "hypothesis_map_c2"}
     note = json.loads((tmp_path / "figures" / "figures.json").read_text())["figures"]
     assert set(note) == names
@@ -200,16 +212,17 @@ def test_colours_are_those_of_the_style() -> None:
 
 
 @pytest.fixture(scope="module")
-def figures() -> dict[str, Figure]:
+def figures() -> Iterator[dict[str, Figure]]:
     """Every figure of the known study, at its size in print."""
     found = {}
     for module in FIGURES:
         each = hasattr(module, "EACH")
-        tables = of_c1(module) if each else {name: study_tables()[name] for name in module.TABLES}
+        tables = of_c1(module) if each else tables_for(module)
         found[module.__name__.rpartition(".")[2]] = module.draw(**tables)
     for figure in found.values():
         figure.canvas.draw()
-    return found
+    yield found
+    plt.close("all")
 
 
 NAMES = [module.__name__.rpartition(".")[2] for module in FIGURES]

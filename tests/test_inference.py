@@ -9,6 +9,7 @@ from mlci.inference import (
     confidence,
     log_likelihood_gain,
     posterior,
+    printed_confidence,
     rank_constraints,
     rank_scores,
 )
@@ -112,3 +113,13 @@ def test_errors_name_the_fault() -> None:
         posterior(np.zeros(2), prior=[1.0, -1.0])
     with pytest.raises(ValueError, match=r"lies in \[0, 1\]"):
         confidence(1.5, [])
+
+
+def test_printed_confidence_is_what_the_paper_prints() -> None:
+    assert printed_confidence(0.5, [0.2] * 9) == pytest.approx(1.155, abs=5e-4)
+    assert printed_confidence(0.9, [0.5]) == pytest.approx(0.9 / (0.9 - 0.1 * 0.5))
+    assert printed_confidence(0.5, []) == np.inf
+    assert printed_confidence(0.2, [0.1]) == pytest.approx(0.2 / (0.2 - 0.8 * 0.9))
+    assert printed_confidence(0.2, [0.1]) < 0
+    with pytest.raises(ValueError, match=r"\[0, 1\], not 1.5"):
+        printed_confidence(1.5, [0.1])

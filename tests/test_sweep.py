@@ -247,6 +247,9 @@ def test_each_case_joins_each_combination(tmp_path: Path) -> None:
     assert listed(tmp_path, cases) == ["defaults", *(end.strip() for end in ends[1:])]
     swept = [f"dt={dt}{end}" for dt in (0.5, 1.0) for end in ends]
     assert listed(tmp_path, "dt=0.5,1.0", cases) == swept
+    assert listed(tmp_path, "dt=0.5,1.0", cases.replace("seed=3", "seed=3,4")) == [
+        name for name in swept for name in ([name, name[:-1] + "4"] if "seed" in name else [name])
+    ]
     # The command line wins, over one key of a case as over a swept one.
     names = [f"seed={seed}{end.removesuffix(' seed=3')}" for seed in (4, 5) for end in ends]
     assert listed(tmp_path, cases, "seed=4,5") == names
@@ -266,13 +269,15 @@ hydra:
       - []
       - [seed=1]
       - [grid=100, "tasks.lower=[null,-0.5]"]
+      - ["seed=2,3,4", "case='some seeds: a few'"]
 """
     )
     words = ["experiment=mine", f"--config-dir={tmp_path}"]
     cases = ["", " seed=1", " grid=100 tasks.lower=[null,-0.5]"]
-    for scale, values in (([], (1, 2, 3)), (["scale=smoke"], (1, 3))):
+    for scale, values, seeds in (([], (1, 2, 3), (2, 3, 4)), (["scale=smoke"], (1, 3), (2, 4))):
         found = listed(tmp_path, *scale, *words)
-        assert found == [f"temperature={value}{case}" for value in values for case in cases]
+        every = [*cases, *(f" seed={seed} case=some seeds: a few" for seed in seeds)]
+        assert found == [f"temperature={value}{case}" for value in values for case in every]
 
 
 def test_forced_point_runs_again(tmp_path: Path) -> None:

@@ -165,6 +165,26 @@ def test_collate_adds_columns_that_tell_points_apart(settings: Settings, tmp_pat
     assert (tables / "dimensions.csv").read_text() == joined("dimensions.csv", points[:1])
 
 
+def test_cases_that_are_named_join_the_measures(settings: Settings, tmp_path: Path) -> None:
+    warm, folder = {"temperature": 2.0}, tmp_path / "study"
+    points = [finished(settings, tmp_path, seed=seed) for seed in (0, 1)]
+    points += [finished(settings, tmp_path, seed=seed, **warm) for seed in (0, 1)]
+    names = ["case=default", "case=default", "case='temperature: 2'", "case='temperature: 2'"]
+    collate(points, folder)
+    assert not (folder / "tables" / "cases.csv").exists()
+    words = [[name, "dt=0.5"] for name in names]
+    write_plan(folder, list(zip(points, words, strict=True))[::-1])
+    collate(points[::-1], folder)
+    tables = (folder / "tables" / f"{name}.csv" for name in ("cases", "measures"))
+    cases, measures = (pd.read_csv(table, keep_default_na=False) for table in tables)
+    assert cases["case"].tolist() == ["temperature: 2", "default"]  # as planned
+    assert cases["choice"].tolist() == ["temperature", "default"]
+    assert cases["value"].tolist() == ["2", ""]
+    both = measures.merge(cases, how="left", validate="many_to_one")
+    assert len(both) == len(measures)
+    assert (both["case"] == both["temperature"].map({1: "default", 2: "temperature: 2"})).all()
+
+
 def test_collate_refuses_an_unfinished_point(settings: Settings, tmp_path: Path) -> None:
     done, missing = finished(settings, tmp_path), Point(settings, tmp_path / "elsewhere")
     with pytest.raises(CollateError, match=f"point {missing.identity} is not finished"):

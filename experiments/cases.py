@@ -1,0 +1,47 @@
+"""What the points of a study are instances of, in the words of the study's own file.
+
+A case of `hydra.sweeper.cases` may name itself: `case='temperature: 0.5'`, or `case=default`. The
+name changes no result and is no part of a point's identity; it is read from the study's plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+
+def case_table(
+    summary: Path, points: Sequence[str], plan: Mapping[str, Sequence[str]]
+) -> pd.DataFrame | None:
+    """The names of a study's cases, for joining with its tables of groups.
+
+    Args:
+        summary: the collated table of that name, a row a point.
+        points: identities, in the order of those rows.
+        plan: the overrides that make each point, by its identity, as the study lists them.
+
+    Returns:
+        The columns that open those tables (all but `seed`), a row a group, the cases in the order
+        of the plan; `case`, its name; `choice` and `value`, the parts of the name before and after
+        its colon. None if no point has a name.
+    """
+    place = {name: i for i, name in enumerate(dict.fromkeys(map(_name, plan.values())))}
+    names = [_name(plan.get(point, ())) for point in points]
+    if not any(names):
+        return None
+    rows = pd.read_csv(summary, dtype=str, keep_default_na=False)
+    rows = rows[list(rows.columns[: rows.columns.get_loc("seed")])]
+    parts = [name.partition(": ") for name in names]
+    rows = rows.assign(
+        case=names, choice=[part[0] for part in parts], value=[part[2] for part in parts]
+    )
+    rows = rows[rows["case"] != ""].drop_duplicates()
+    return rows.sort_values("case", key=lambda case: case.map(place), kind="stable")
+
+
+def _name(overrides: Sequence[str]) -> str:
+    """The name among a point's overrides, or nothing."""
+    given = [word.partition("=")[2] for word in overrides if word.startswith("case=")]
+    return given[-1].strip("'\"") if given else ""
