@@ -7,8 +7,9 @@ large to keep beside the study.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,8 @@ from mlci.spaces import Ints
 if TYPE_CHECKING:
     from experiments.record import Point
 
-# The point that stands for a truth: these values, or the nearest that the study holds.
+# The point that stands for a truth: these values, or the nearest that the study holds; of several,
+# the one whose other settings most points have.
 CELLS, DT, ACTIONS = 400, 0.25, 9
 # The grids whose trajectories are compared, coarse to fine, or the nearest that the study holds.
 COMPARED = (100, 900, 1600)
@@ -58,9 +60,10 @@ def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
     truths = sorted({_truth(point) for point in points})
     if len(truths) > _MOST_TRUTHS:
         return {}
+    unusual = _unusual(points)
     for truth in truths:
         of_truth = [point for point in points if _truth(point) == truth]
-        example = min(of_truth, key=_distance)
+        example = min(of_truth, key=lambda point: (*_distance(point), unusual[point.identity]))
         for name, table in _example(example).items():
             tables[name].append(table)
         trial, alike = _comparison(example, of_truth)
@@ -87,6 +90,18 @@ def _distance(point: Point) -> tuple[float, ...]:
         settings.transition.samples,
         settings.seed,
     )
+
+
+def _unusual(points: Sequence[Point]) -> dict[str, int]:
+    """How many settings of each point are not those of most points, by its identity."""
+    counts: dict[str, int] = dict.fromkeys((point.identity for point in points), 0)
+    for field in fields(points[0].settings):
+        values = {point.identity: repr(getattr(point.settings, field.name)) for point in points}
+        times = Counter(values.values())
+        usual = min(times, key=lambda value: (-times[value], value))
+        for identity, value in values.items():
+            counts[identity] += value != usual
+    return counts
 
 
 def _example(point: Point) -> dict[str, pd.DataFrame]:

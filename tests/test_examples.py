@@ -147,6 +147,17 @@ def test_order_of_points_does_not_matter_and_truths_stand_apart(points: list[Poi
         pd.testing.assert_frame_equal(table, two[name])
 
 
+def test_example_has_the_settings_of_most_points(points: list[Point]) -> None:
+    own, results = points[0].settings, points[0].results
+    cold = Point(dataclasses.replace(own, temperature=0.5), results)
+    often = Point(dataclasses.replace(own, rollouts=2), results)
+    for point in (cold, often):
+        attempt.run(point, print)
+    # All are equally near; temperature 0.5 comes first in tables.
+    for order in ([cold, points[0], often], [often, points[0], cold]):
+        assert set(example_tables(order)["example_ranking"]["point"]) == {points[0].identity}
+
+
 def test_many_truths_have_no_examples(points: list[Point]) -> None:
     named = [
         Point(
