@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
+from paper_report import sensitivity
 from paper_report.markdown import between, percent, table
 from paper_report.means import share
-from paper_report.results import Results, command
+from paper_report.results import Missing, Results, command
 from paper_report.verdict import Check, Claim, Part
 
 PAPER = 0.65
@@ -66,4 +67,8 @@ def _why(results: Results, attempts: pd.DataFrame) -> str:
         f" at some time, {percent((peaks > 2).mean())} of them more than the 2 rad/s² of the"
         " tabular agent."
     )
-    return text + "\n"
+    try:
+        tried = sensitivity.kept(results)
+    except Missing:
+        return text + "\n"
+    return f"{text} Share kept when one choice that the paper leaves open is changed:\n\n{tried}"

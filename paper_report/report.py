@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from paper_report import (
     accuracy,
     actions,
+    calibration,
     in_cell,
     kept,
     provenance,
     ranking,
     sensitivity,
     telescope,
+    timings,
     violations,
 )
 from paper_report.markdown import figure, table
@@ -47,9 +49,26 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
     (
         "Sensitivity to what the paper leaves open",
         sensitivity.section,
-        (Figure("sensitivity", "sensitivity", "One choice changed at a time."),),
+        (
+            Figure("sensitivity", "sensitivity_c1", "One choice changed at a time, truth C1."),
+            Figure("sensitivity", "sensitivity_c2", "One choice changed at a time, truth C2."),
+        ),
     ),
-    ("In-cell sampling at 100 cells", in_cell.section, ()),
+    (
+        "Calibration of the posterior",
+        calibration.section,
+        (Figure("calibration", "calibration", "Share that is right against probability."),),
+    ),
+    (
+        "In-cell sampling at 100 cells",
+        in_cell.section,
+        (Figure("in_cell", "in_cell", "100 cells with 1 and 3 start points along a dimension."),),
+    ),
+    (
+        "Time and memory",
+        timings.section,
+        (Figure("benchmark", "scale", "Time and memory against the number of states."),),
+    ),
     ("Where the numbers come from", provenance.section, ()),
 )
 

@@ -4,75 +4,84 @@ from __future__ import annotations
 
 import pandas as pd
 
-from paper_report.markdown import table
-from paper_report.means import Mean
+from paper_report.markdown import between, number, percent, table
 from paper_report.ranking import PAPER, RULE, TOP, after
 from paper_report.results import Missing, Results
 
 STUDY = "sensitivity"
+DEFAULT = "default"  # the case that the others are compared with
+CELLS, DT = 400, 0.25  # of the rows that are spelt out
 SHOWN = {
+    "reachable": "goals that can be reached",
     "final_state_error": "final-state error",
     "violation_distance": "violation distance",
-    "violation_distance_pooled": "pooled",
 }
 
 
 def section(results: Results) -> str:
-    """A line for each choice and truth, the default first.
+    """A line for each case, truth and discretisation, the default first.
 
     Raises:
         Missing: the study `sensitivity` is not there yet.
     """
-    columns = ("truth", "measure", "mean", "low", "high")
-    means = results.table(STUDY, "measures", columns)
-    ranks = after(results, STUDY)
-    choices = changed(ranks)
-    ranks = ranks.assign(choice=choices)
-    means = means.assign(choice=changed(means))
-    rows, same, other = [], [], []
-    usual = dict(ranks[ranks["choice"] == DEFAULT].set_index("truth")["found"])
-    if not usual:
-        raise Missing(STUDY, f"the study `{STUDY}` has no point with all values as by default")
-    for choice in sorted(set(choices), key=lambda name: (name != DEFAULT, name)):
-        for truth, own in ranks[ranks["choice"] == choice].groupby("truth"):
-            (rank,) = own.to_dict("records")
-            found = means[(means["choice"] == choice) & (means["truth"] == truth)]
-            values = {
-                row.measure: str(Mean(row.mean, row.low, row.high)) for row in found.itertuples()
-            }
-            rows.append(
-                [
-                    f"{choice}, {truth.upper()}",
-                    *(values.get(name, "-") for name in SHOWN),
-                    rank["text"],
-                ]
-            )
-            if choice != DEFAULT:
-                (same if rank["found"] == usual.get(truth) else other).append(rows[-1][0])
-    head = ["choice, truth", *SHOWN.values(), f"median rank after {PAPER}; share in the top {TOP}"]
-    verdict = (
-        f"The rule of claim 4 ({RULE}) comes out as by default in {len(same)} of "
-        f"{len(same) + len(other)} rows"
+    cases = results.table(STUDY, "cases", ("truth", "cells", "dt", "case"))
+    keys = [name for name in cases if name not in ("case", "choice", "value")]
+    means = results.table(STUDY, "measures", (*keys, "measure", "mean", "low", "high"))
+    ranks = cases.merge(after(results, STUDY), on=keys, validate="one_to_one")
+    usual = ranks[ranks["case"] == DEFAULT]
+    if usual.empty:
+        raise Missing(STUDY, f"the study `{STUDY}` has no case {DEFAULT!r}")
+    texts = means[means["measure"].isin(SHOWN)].assign(text=[_text(row) for row in _rows(means)])
+    wide = texts.pivot(index=keys, columns="measure", values="text").reset_index()
+    ranks = ranks.merge(wide, on=keys, how="left", validate="one_to_one")
+    names = list(dict.fromkeys(ranks["case"]))
+    lines = []
+    for case in names:
+        own = ranks[(ranks["case"] == case) & _usual_grid(ranks)].sort_values("truth")
+        for row in own.to_dict("records"):
+            setting = f"{row['truth'].upper()}, {row['cells']} cells, dt {row['dt']:g}"
+            lines.append([case, setting, *(row[name] for name in SHOWN), row["text"]])
+    found = ranks.groupby("case")["found"].agg(["sum", "size"]).loc[names]
+    verdicts = [[case, f"{row['sum']} of {row['size']}"] for case, row in found.iterrows()]
+    head = ["case", "setting", *SHOWN.values(), f"median rank after {PAPER}; in the top {TOP}"]
+    return (
+        f"Settings (truth, cells and dt) in which the truth is found, which means {RULE}:\n\n"
+        + table(["case", "found in"], verdicts)
+        + f"\nAt {CELLS} cells, or little more, and dt {DT:g} s; the tables of `results/{STUDY}` "
+        "have the other settings:\n\n" + table(head, lines, words=2)
     )
-    verdict += f"; it does not for: {'; '.join(other)}." if other else "."
-    return f"{verdict}\n\n{table(head, rows)}"
 
 
-DEFAULT = "default"
+def kept(results: Results) -> str:
+    """How many pairs become demonstrations by default and in each case where others do.
 
-
-def changed(rows: pd.DataFrame) -> list[str]:
-    """What differs in each row from the usual value of its column, in words.
-
-    Args:
-        rows: opening columns up to `samples`, with the usual value in most rows.
+    Raises:
+        Missing: the study `sensitivity` is not there yet.
     """
-    names = list(rows.columns)
-    opening = [name for name in names[: names.index("samples") + 1] if name != "truth"]
-    text = rows[opening].astype(object).where(rows[opening].notna(), "none").astype(str)
-    usual = text.mode().iloc[0]
-    return [
-        ", ".join(f"`{name}={row[name]}`" for name in opening if row[name] != usual[name])
-        or DEFAULT
-        for _, row in text.iterrows()
-    ]
+    cases = results.table(STUDY, "cases", ("truth", "cells", "dt", "case"))
+    keys = [name for name in cases if name not in ("case", "choice", "value")]
+    pairs = cases.merge(results.table(STUDY, "summary", (*keys, "pairs", "kept")), on=keys)
+    shares = pairs.assign(share=pairs["kept"] / pairs["pairs"]).groupby(["case", "truth"])["share"]
+    wide = shares.first().unstack()
+    wide = wide.loc[list(dict.fromkeys(pairs["case"]))]
+    wide = wide[(wide != wide.loc[DEFAULT]).any(axis=1) | (wide.index == DEFAULT)]
+    return table(
+        ["case", *(truth.upper() for truth in wide)],
+        [[case, *(percent(value) for value in row)] for case, row in wide.iterrows()],
+    )
+
+
+def _usual_grid(ranks: pd.DataFrame) -> pd.Series:
+    """Whether a row is of the default discretisation."""
+    return ranks["cells"].between(CELLS, 1.1 * CELLS) & (ranks["dt"] == DT)
+
+
+def _rows(means: pd.DataFrame) -> list[dict]:
+    """The rows that are shown."""
+    return means[means["measure"].isin(SHOWN)].to_dict("records")
+
+
+def _text(row: dict) -> str:
+    """A mean with its interval."""
+    spell = percent if row["measure"] == "reachable" else number
+    return between(*(spell(row[end]) for end in ("mean", "low", "high")))

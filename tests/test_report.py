@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from html.parser import HTMLParser
 from itertools import product
 from pathlib import Path
@@ -17,6 +16,7 @@ from paper_report import __main__ as command_line
 from paper_report import (
     accuracy,
     actions,
+    calibration,
     in_cell,
     kept,
     page,
@@ -24,6 +24,7 @@ from paper_report import (
     readme,
     sensitivity,
     telescope,
+    timings,
     violations,
 )
 from paper_report.means import Mean, share
@@ -286,38 +287,86 @@ def test_claim_6_wants_both_best_hypotheses_and_the_time(tmp_path: Path) -> None
     assert parts(telescope.claim(Results(tmp_path))) == [(1, 2), (1, 1)]
 
 
-def test_sensitivity_names_what_differs_from_the_default(results: Results) -> None:
-    kinds = [{}, {"temperature": 0.1}, {"temperature": 4.0}, {"demonstrations.clip": True}]
-    setting = {"truth": "c1", "cells": 400, "actions": 9, "dt": 0.25, "samples": 1}
-    usual = {"temperature": 1.0, "demonstrations.clip": False}
-    curve = curve_rows().query("truth == 'c1' and cells == 400 and actions == 9 and dt == 0.25")
-    means = measure_rows().query("truth == 'c1' and cells == 400 and actions == 9 and dt == 0.25")
-    ranks = pd.concat(
-        [
-            pd.DataFrame([usual | kind] * len(curve)).assign(**curve.reset_index(drop=True))
-            for kind in kinds
-        ],
-        ignore_index=True,
-    )
-    measures = pd.concat(
-        [
-            pd.DataFrame([usual | kind] * len(means)).assign(**means.reset_index(drop=True))
-            for kind in kinds
-        ],
-        ignore_index=True,
-    )
-    ranks.loc[ranks["demonstrations.clip"], "median"] = 12.0
-    write(results.folder, "sensitivity", rank_curve=ranks, measures=measures)
-    text = sensitivity.section(Results(results.folder))
-    assert list(setting) == list(curve.columns[:5])
-    names = re.findall(r"^\| (.*?), C1 \|", text, re.M)
-    assert names == [
-        "default",
-        "`demonstrations.clip=True`",
-        "`temperature=0.1`",
-        "`temperature=4.0`",
+def test_sensitivity_counts_where_the_truth_is_found_in_each_case(results: Results) -> None:
+    some = "cells in (100, 400) and actions == 9 and dt in (0.2, 0.25)"
+    names = {"default": 1.0, "temperature: 4": 4.0}
+    opening = ["temperature", "truth", "cells", "actions", "dt", "samples"]
+
+    def both(rows: pd.DataFrame) -> pd.DataFrame:
+        parts = [rows.query(some).assign(temperature=value) for value in names.values()]
+        rows = pd.concat(parts, ignore_index=True)
+        return rows[[*opening, *(name for name in rows if name not in opening)]]
+
+    ranks, means, summary = both(curve_rows()), both(measure_rows()), both(summary_rows())
+    ranks.loc[(ranks["temperature"] == 4) & (ranks["truth"] == "c2"), "median"] = 12.0
+    cases = ranks[opening].drop_duplicates()
+    words = {value: name for name, value in names.items()}
+    cases = cases.assign(case=cases["temperature"].map(words), choice="", value="")
+    summary = summary.assign(pairs=100, kept=np.where(summary["temperature"] == 4, 70, 90))
+    tables = {"cases": cases, "rank_curve": ranks, "measures": means, "summary": summary}
+    write(results.folder, "sensitivity", **tables)
+    found = Results(results.folder)
+    text = sensitivity.section(found)
+    # Of two truths, two grids and two dt, 100 cells at dt 0.2 s fail in any case.
+    assert "| default | 6 of 8 |" in text
+    assert "| temperature: 4 | 3 of 8 |" in text
+    assert text.count(", 400 cells, dt 0.25 |") == 4
+    assert ", 100 cells" not in text
+    assert "| temperature: 4 | 70 % | 70 % |" in kept.claim(found).why
+    write(results.folder, "sensitivity", cases=cases[cases["case"] != "default"])
+    with pytest.raises(Missing, match="has no case 'default'"):
+        sensitivity.section(Results(results.folder))
+
+
+def test_calibration_counts_bins_that_agree(tmp_path: Path) -> None:
+    rows = [
+        # lower, upper, predicted, observed, low, high, weight, count
+        (0.0, 0.5, 0.2, 0.3, 0.1, 0.4, 0.5, 50),
+        (0.5, 1.0, 0.8, 0.4, 0.3, 0.5, 0.25, 50),
+        (0.5, 1.0, 0.9, 0.9, 0.8, 0.95, 0.0, 19),
+        (1.0, np.inf, 3.0, 0.1, 0.0, 0.2, 0.25, 30),
     ]
-    assert "as by default in 2 of 3 rows; it does not for: `demonstrations.clip=True`, C1." in text
+    names = ["lower", "upper", "predicted", "observed", "low", "high", "weight", "count"]
+    table = pd.DataFrame(rows, columns=names)
+    table = table.assign(source="model", demonstrations=3, belief="selected")
+    write(tmp_path, "calibration", reliability=table)
+    text = calibration.section(Results(tmp_path))
+    # Two thirds of the probabilities at 0.2 and one at 0.8: 0.4; right 1/3; off 0.1 and 0.4: 0.2.
+    assert "| 3 | 0.400 | 0.333 | 0.200 | 1 of 2 | 25 % |" in text
+    assert "most likely one, exact posterior" in text
+
+
+def test_times_are_in_units_that_suit_them(tmp_path: Path) -> None:
+    machine = {
+        "cpu": "a cpu",
+        "python": "3",
+        "numpy": "2",
+        "scipy": "1",
+        "commit": "c",
+        "date": "d",
+    }
+    times = pd.DataFrame(
+        {
+            "name": ["collate_point", "largest_paper_point"],
+            "median_s": [0.0021, 12.34],
+            "floor_s": [0.0005, np.nan],
+            "ratio": [4.2, np.nan],
+            "runs": 1,
+            "what": ["collating", "all"],
+            "paper": [np.nan, "5 min"],
+        }
+    ).assign(**machine)
+    size = {"system": "t", "states": 1000, "actions": 15, "discretise_s": 0.5, "infer_s": 2e-5}
+    costs = pd.DataFrame([{"name": "n", "what": "files", "value": 12.0, "unit": "inodes"}])
+    scale = pd.DataFrame([{**size, "peak_mb": 150}])
+    write(tmp_path, "benchmark", benchmark=times, costs=costs, scale=scale)
+    found = Results(tmp_path)
+    text = timings.section(found)
+    assert "| collating |  | 2.1 ms | 500 µs | 4.2 |" in text
+    assert "| all | 5 min | 12.3 s | - | - |" in text
+    assert "| t | 1000 | 15 | 500 ms | 20 µs | 150 MB |" in text
+    assert "| files | 12 inodes |" in timings.points(found)
+    assert "| all | 12.3 s |" in timings.points(found)
 
 
 def test_in_cell_sampling_counts_where_the_truth_is_found(results: Results) -> None:
@@ -337,9 +386,10 @@ def test_in_cell_sampling_counts_where_the_truth_is_found(results: Results) -> N
 
 def test_what_is_not_there_is_told_with_its_command(results: Results) -> None:
     text = report(results)
-    for study in ("telescope", "sensitivity", "in_cell"):
+    for study in ("telescope", "sensitivity", "calibration", "in_cell"):
         assert f"`python experiments/run.py -m experiment={study}` makes it." in text
-    assert text.count("Not there yet") == 3
+    assert "`make benchmark` makes it." in text
+    assert text.count("Not there yet") == 5
     few = results.table("paper", "measures").query("cells != 900")
     write(results.folder, "paper", measures=few)
     with pytest.raises(Missing, match=r"no point with truth c1, 900 cells and dt 0\.1 s"):
