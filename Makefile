@@ -48,7 +48,7 @@ lint: $(READY) ## check style, formatting and types
 	$(BIN)/mypy mlci experiments
 
 benchmark: $(READY) ## time the main algorithms against floors of this machine
-	$(BIN)/python tests/benchmark.py
+	$(BIN)/python -m tests.benchmark
 
 lock: $(READY) ## write requirements.lock from pyproject.toml, at the newest versions
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.memory import expected_memory, machine_memory
 from experiments.schema import plain
 from experiments.settings import (
     NO_TRUTH,
@@ -30,7 +31,7 @@ from mlci.spaces import StateSpace
 
 _MOST_STEPS = 100_000
 _MOST_COUNT = 1_000_000  # of trials, rollouts and the like
-_MOST_ENTRIES = 100_000_000  # of one array of the tabular model: about 1 GB each
+_MOST_VALUES = 100_000_000  # of a safe set's grid: about 1 GB for each of its arrays
 
 _LONGEST = 1e8  # [s], three years
 _TAKEN = ("points", "store", "diffs", "inference")  # among the folders of results
@@ -287,18 +288,13 @@ def _region_problems(
 
 def size_problems(settings: ModelSettings) -> Iterator[str]:
     """What is too large to hold."""
-    n = settings.model.space.dimension
-    moves = math.prod(settings.action_counts) * settings.transition.samples**n
-    hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
-    hypotheses += len(settings.hypotheses.boxes)
-    for key, size, what in (
-        ("grid.shape", math.prod(settings.grid.shape) * moves, "transitions"),
-        ("hypotheses.shape", hypotheses * math.prod(settings.grid.shape), "probabilities"),
-    ):
-        if size > _MOST_ENTRIES:
-            value = list(getattr(settings, key.split(".")[0]).shape or ())
-            yield f"{key}: {value} makes {size:.2g} {what}, over {_MOST_ENTRIES:.0e}; use fewer"
-            return
+    needed, there = expected_memory(settings) / 1e9, machine_memory() / 1e9
+    if needed > there:
+        yield (
+            f"grid.shape: {list(settings.grid.shape)} with {list(settings.action_counts)} actions, "
+            f"{settings.transition.samples} samples and these hypotheses takes about {needed:.3g} "
+            f"GB, and this machine has {there:.3g}; use fewer cells, actions, samples or hypotheses"
+        )
 
 
 def truth_problems(settings: Settings) -> Iterator[str]:
@@ -310,7 +306,7 @@ def truth_problems(settings: Settings) -> Iterator[str]:
             f"{count}, from 0 to {count - 1}"
         )
         return
-    if math.prod(settings.safety.shape) > _MOST_ENTRIES:
+    if math.prod(settings.safety.shape) > _MOST_VALUES:
         yield f"safety.shape: {list(settings.safety.shape)} makes too many values; use fewer"
     if settings.calibration.sets and settings.truth.boxes:
         yield (

@@ -141,18 +141,23 @@ class ConstraintSet:
         Args:
             starts: (Q, n) first ends of the chords.
             steps: (Q, n) displacements; below half a period in periodic dimensions.
-            owner: (Q,) the row of the result that a chord counts for.
+            owner: (Q,) the row of the result that a chord counts for; cheapest if ascending.
             owners: number of rows.
 
         Returns:
             (owners, C) sparse boolean matrix.
         """
-        entered = np.zeros(owners * len(self), dtype=bool)
+        keys = [np.empty(0, dtype=np.int64)]
         for first in range(0, len(starts), _CHORDS_AT_ONCE):
             part = slice(first, first + _CHORDS_AT_ONCE)
             chord, region = self._chord_hits(self.space.wrap(starts[part]), steps[part])
-            entered[owner[part][chord] * len(self) + region] = True
-        rows, columns = np.divmod(np.flatnonzero(entered), len(self))
+            key = owner[part][chord] * len(self) + region
+            begin, end = owner[part].min() * len(self), (owner[part].max() + 1) * len(self)
+            entered = np.zeros(end - begin, dtype=bool)
+            entered[key - begin] = True
+            keys.append(begin + np.flatnonzero(entered))
+        # Only a path that lies in two parts can be there twice.
+        rows, columns = np.divmod(np.unique(np.concatenate(keys)), len(self))
         ends = np.append(0, np.cumsum(np.bincount(rows, minlength=owners)))
         return sparse.csr_matrix(
             (np.ones(len(rows), dtype=bool), columns, ends), shape=(owners, len(self))

@@ -19,7 +19,7 @@ from mlci.mdp import Progress, TabularMDP
 from mlci.spaces import Bools, Floats, Ints
 
 _CELLS_AT_ONCE = 1 << 12  # whose moves a step of work holds
-_PHI_BYTES = 1 << 29  # of violation probabilities held at once, else regions go block by block
+PHI_BYTES = 1 << 29  # of violation probabilities held at once, else regions go block by block
 
 
 def reachable(mdp: TabularMDP, start: int, steps: int) -> list[Ints]:
@@ -90,7 +90,7 @@ def violation_probabilities(mdp: TabularMDP, log_z: Floats, start: int) -> Float
         raise ValueError(f"no trajectory from cell {start} reaches a goal: Phi is not defined")
     regions = mdp.crosses.shape[1]
     support = int(np.max(np.sum(log_z > -np.inf, axis=1)))
-    blocks = min(regions, -(-regions * 2 * 8 * support // _PHI_BYTES))
+    blocks = min(regions, -(-regions * 2 * 8 * support // PHI_BYTES))
     edges = np.linspace(0, regions, max(1, blocks) + 1).astype(int)
     phi = np.empty(regions)
     for first, last in pairwise(edges):

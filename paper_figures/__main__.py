@@ -24,6 +24,7 @@ from paper_figures import (
     in_cell,
     overview,
     rank_curve,
+    scale,
     sensitivity,
     state_space,
     trajectories,
@@ -46,9 +47,10 @@ FIGURES: tuple[ModuleType, ...] = (
     rank_curve,
     trajectories,
     hypothesis_map,
-    in_cell,
-    sensitivity,
     calibration,
+    in_cell,
+    scale,
+    sensitivity,
 )
 
 

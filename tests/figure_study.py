@@ -160,6 +160,27 @@ def measure_rows() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def scale_rows() -> pd.DataFrame:
+    """Three sizes of one system, whose cost doubles with the states, and one of another."""
+    states = np.array([1000, 2000, 4000, 4000])
+    return pd.DataFrame(
+        {
+            "system": ["telescope"] * 3 + ["torus"],
+            "states": states,
+            "actions": 15,
+            "hypotheses": 100,
+            "steps": 20,
+            "dt": 0.25,
+            "largest_active_share": [0.1, 0.2, 0.25, 0.75],
+            "discretise_s": states / 1e4,
+            "infer_s": [0.01, 0.02, 0.04, 0.3],
+            "total_s": states / 1e4 + [0.01, 0.02, 0.04, 0.3],
+            "peak_mb": [100, 110, 130, 200],
+            **dict.fromkeys(("cpu", "python", "numpy", "scipy", "commit", "date"), "x"),
+        }
+    )
+
+
 def study_tables() -> dict[str, pd.DataFrame]:
     """All tables that figures of the paper are drawn from."""
     return {

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from choice_studies import known_tables
-from figure_study import curve_rows, measure_rows, path_rows, study_tables
+from figure_study import curve_rows, measure_rows, path_rows, scale_rows, study_tables
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -27,12 +27,13 @@ from paper_figures.origin import SHARED, concerns
 from paper_figures.selection import Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, COLUMN, PAGE, TRUTH, save
 
-CHOICES = known_tables()
+# Figures of other studies than the paper's.
+OTHERS = {**known_tables(), "scale": {"scale": scale_rows()}}
 
 
 def tables_for(module: ModuleType) -> dict[str, pd.DataFrame]:
     """The known tables that a module needs."""
-    known = {**study_tables(), **CHOICES.get(module.__name__.rpartition(".")[2], {})}
+    known = {**study_tables(), **OTHERS.get(module.__name__.rpartition(".")[2], {})}
     return {name: known[name] for name in module.TABLES}
 
 
@@ -116,7 +117,7 @@ def test_a_study_is_drawn_from_its_tables_alone(tmp_path: Path) -> None:
     drawn = draw_study(tmp_path)
     names = {path.stem for path in drawn}
     single = {module.__name__.rpartition(".")[2] for module in FIGURES}
-    single -= {"hypothesis_map", *CHOICES}
+    single -= {"hypothesis_map", *OTHERS}
     assert names == single | {"hypothesis_map_c1", "hypothesis_map_c2"}
     note = json.loads((tmp_path / "figures" / "figures.json").read_text())["figures"]
     assert set(note) == names
@@ -233,7 +234,7 @@ def test_labels_have_units(name: str, figures: dict[str, Figure]) -> None:
     figure = figures[name]
     labels = {axes.get_xlabel() for axes in figure.axes} | {a.get_ylabel() for a in figure.axes}
     labels |= {figure.get_supylabel()}
-    counted = {"", "demonstrations", "rank of truth", r"$\Phi_i$ of one trial"}
+    counted = {"", "demonstrations", "states", "rank of truth", r"$\Phi_i$ of one trial"}
     assert all(re.search(r"\[[^]]+\]$", label) for label in labels - counted), labels
 
 

@@ -120,7 +120,7 @@ def test_blocks_of_any_size_give_the_same_bits(
     phi = violation_probabilities(mdp, whole, 40)
     assert np.sum((phi > 0.01) & (phi < 0.99)) > 10
     monkeypatch.setattr("mlci.maxent._CELLS_AT_ONCE", cells_at_once)
-    monkeypatch.setattr("mlci.maxent._PHI_BYTES", phi_bytes)
+    monkeypatch.setattr("mlci.maxent.PHI_BYTES", phi_bytes)
     log_z = log_partition(mdp, 40, [90, 91], 10)
     np.testing.assert_array_equal(log_z, whole)
     np.testing.assert_array_equal(violation_probabilities(mdp, log_z, 40), phi)

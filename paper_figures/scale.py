@@ -1,0 +1,113 @@
+"""Time and memory of one task against the number of tabular states, in four dimensions."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paper_figures.style import COLUMN, GUIDE, OTHER_COLOURS, RC, new_figure
+
+TABLES = {
+    "scale": (
+        *("system", "states", "actions", "hypotheses", "steps", "dt", "largest_active_share"),
+        *("discretise_s", "infer_s", "total_s", "peak_mb"),
+        *("cpu", "python", "numpy", "scipy", "commit", "date"),
+    )
+}
+PAPER_STATES = 2500  # of the paper's telescoping pendulum
+
+# What is drawn of each row: colour and mark, filled for the first system, hollow for others.
+_TIMES = (
+    ("discretise_s", "discretise", OTHER_COLOURS[0], "o"),
+    ("infer_s", "infer and rank", OTHER_COLOURS[1], "s"),
+)
+_MEMORY = (("peak_mb", "peak", OTHER_COLOURS[0], "^"),)
+
+
+def draw(scale: pd.DataFrame) -> Figure:
+    """Draw time and memory, both axes logarithmic, with a line of slope 1 through the last point.
+
+    Args:
+        scale: the table of that name: a row a system and size.
+    """
+    figure, (left, right) = new_figure(COLUMN, 2.1, ncols=2)
+    with plt.rc_context(RC):
+        _draw_panel(left, scale, _TIMES, "processor time [s]")
+        _draw_panel(right, scale, _MEMORY, "memory [MB]")
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return figure
+
+
+def facts(scale: pd.DataFrame) -> str:
+    """What the caption says."""
+    first = scale.iloc[0]
+    lines = [
+        "One task of the telescoping pendulum against the number of tabular states: forming the "
+        "tabular model, and Phi of all hypotheses with the ranking; processor time of one thread "
+        "(left) and peak memory of the process (right).",
+        f"{first['actions']} actions, {first['hypotheses']} hypotheses, {first['steps']} steps of "
+        f"{first['dt']:g} s; one run a size, so the times have no intervals.",
+        "Filled: telescoping pendulum. Hollow: four angles that no bound stops, so that most "
+        "cells are active. Dotted: slope 1; line: the paper's 2500 states.",
+    ]
+    for system, rows in _systems(scale):
+        for row in rows.itertuples():
+            lines.append(
+                f"  {system}, {row.states} states: {row.discretise_s:.3g} s and {row.infer_s:.3g} "
+                f"s, {row.peak_mb:.0f} MB, at most {100 * row.largest_active_share:.0f} % of the "
+                "cells active at a step"
+            )
+        if len(rows) > 1:
+            few, many = rows.iloc[0], rows.iloc[-1]
+            slope = np.log(many["total_s"] / few["total_s"]) / np.log(
+                many["states"] / few["states"]
+            )
+            lines.append(
+                f"  {system}: from {few['states']} to {many['states']} states the time grows with "
+                f"the power {slope:.2f}"
+            )
+    lines.append(
+        f"Measured on {first['cpu']}, Python {first['python']}, numpy {first['numpy']}, scipy "
+        f"{first['scipy']}, commit {first['commit']}, {first['date']}."
+    )
+    return "\n".join(lines)
+
+
+def _systems(scale: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    """The rows of each system by size, in the order of the table."""
+    return [
+        (system, scale[scale["system"] == system].sort_values("states"))
+        for system in scale["system"].unique()
+    ]
+
+
+def _draw_panel(
+    axes: Axes,
+    scale: pd.DataFrame,
+    curves: tuple[tuple[str, str, str, str], ...],
+    label: str,
+) -> None:
+    """The curves of one unit."""
+    for number, (_, rows) in enumerate(_systems(scale)):
+        for column, name, colour, sign in curves:
+            axes.plot(
+                rows["states"],
+                rows[column],
+                color=colour,
+                marker=sign,
+                markerfacecolor=colour if number == 0 else "white",
+                linestyle="-" if number == 0 else "--",
+                label=name if number == 0 else None,
+            )
+    longest = _systems(scale)[0][1]
+    x = longest["states"].to_numpy(dtype=float)
+    y = float(longest[curves[0][0]].iloc[-1]) * x / x[-1]
+    axes.plot(x, y, color=GUIDE, linestyle=":", linewidth=0.8)
+    axes.axvline(PAPER_STATES, color=GUIDE, linewidth=0.6)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("states")
+    axes.set_ylabel(label)

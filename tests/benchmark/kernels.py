@@ -1,0 +1,207 @@
+"""Times of the main algorithms against their floors, at the paper's sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from experiments.settings import Settings
+from mlci.constraints import ConstraintSet
+from mlci.demonstrator import demonstrate, sample_trials
+from mlci.grids import Grid
+from mlci.inference import rank_constraints
+from mlci.maxent import expected_violations, log_partition, policy, violation_probabilities
+from mlci.mdp import TabularMDP, action_grid, discretize, substep_count
+from mlci.online import prepare
+from mlci.reachability import solve
+from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.simulate import rk4_step, step_count
+from mlci.spaces import Box, Floats, Ints
+from mlci.systems import Pendulum, System
+from tests.benchmark.timing import Row, copy_rate, median_seconds
+
+_BLOCK = 1 << 14  # moves, whose states stay in the cache
+
+SYSTEM = Pendulum()
+HYPOTHESES = ConstraintSet.from_grid(SYSTEM.space, (10, 10))
+TRUTH = ConstraintSet(SYSTEM.space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])  # type: ignore[arg-type]
+
+
+def phi_floor(mdp: TabularMDP, log_z: Floats) -> float:
+    """Seconds to read each merged successor's row of Phi and to write each row, once a step."""
+    traffic = 0
+    for t in range(len(log_z) - 1):
+        cells, _ = policy(mdp, log_z, t)
+        traffic += int(np.sum(mdp.by_successor[2][cells])) + len(cells)
+    return traffic * mdp.crosses.shape[1] * 8 / copy_rate(1 << 19)
+
+
+def exp_floor(mdp: TabularMDP, log_z: Floats) -> float:
+    """Seconds to take the exponential of each move of each cell that carries probability."""
+    entries = int(np.sum(log_z > -np.inf)) * mdp.moves
+    return median_seconds(lambda: np.exp(np.full(entries, -1.0)))
+
+
+def step_floor(system: System, grid: Grid, actions: Floats, dt: float, mdp: TabularMDP) -> float:
+    """Seconds of the Runge-Kutta steps of all moves, from the rate of a block of them."""
+    cells = max(1, min(grid.size, _BLOCK // mdp.moves))
+    points = np.repeat(grid.centers[:cells], mdp.moves, axis=0)
+    held = actions[np.tile(mdp.action, cells)]
+    one = median_seconds(lambda: rk4_step(system, points, held, dt), 25) * grid.size / cells
+    return substep_count(system, grid, actions, dt) * one
+
+
+def pendulum_rows(cells: int, dt: float, samples: int) -> list[Row]:
+    """Discretisation, soft Bellman backup and violation probabilities of one task."""
+    grid, actions = Grid(SYSTEM.space, (cells, cells)), action_grid(SYSTEM, 9)
+    what = f"pendulum, {grid.size} cells x 9 actions, dt {dt:g} s, {samples} sample(s)"
+    label = f"{grid.size}" + (f"_samples{samples}" if samples > 1 else "")
+    mdp = discretize(SYSTEM, grid, actions, dt, HYPOTHESES, samples)
+    steps = round(5 / dt)
+    start, goal = int(grid.index([0.5, 0.0])), grid.cells_in(Box.point([3.0, 0.0]))
+    log_z = log_partition(mdp, start, goal, steps)
+    violation_probabilities(mdp, log_z, start)  # fills the caches that all tasks share
+    return [
+        Row(
+            f"discretize_{label}",
+            median_seconds(lambda: discretize(SYSTEM, grid, actions, dt, HYPOTHESES, samples), 3),
+            step_floor(SYSTEM, grid, actions, dt, mdp),
+            3,
+            f"discretize: {what}; floor: its Runge-Kutta steps",
+        ),
+        Row(
+            f"log_partition_{label}",
+            median_seconds(lambda: log_partition(mdp, start, goal, steps)),
+            exp_floor(mdp, log_z),
+            7,
+            f"log_partition: {what}; floor: one exponential for each active move",
+        ),
+        Row(
+            f"violation_probabilities_{label}",
+            median_seconds(lambda: violation_probabilities(mdp, log_z, start)),
+            phi_floor(mdp, log_z),
+            7,
+            f"violation_probabilities: {what}; floor: traffic of Phi",
+        ),
+    ]
+
+
+def telescope_rows(settings: Settings, samples: int) -> list[Row]:
+    """The telescoping pendulum at the paper's size: five demonstrations, from nothing to ranks."""
+    system, grid, dt = settings.model, settings.cells, settings.dt
+    actions, hypotheses = action_grid(system, settings.action_counts), settings.candidates
+    paths, starts, goals = telescope_tasks(settings)
+    steps = [step_count(settings.horizon, dt)] * len(paths)
+    mdp = discretize(system, grid, actions, dt, hypotheses, samples)
+    log_z = [log_partition(mdp, *task) for task in zip(starts, goals, steps, strict=True)]
+    what = (
+        f"telescoping pendulum, {grid.size} cells x {len(actions)} actions, {len(hypotheses)} "
+        f"hypotheses, {steps[0]} steps, {samples} sample(s)"
+    )
+    label = "telescope" + (f"_samples{samples}" if samples > 1 else "")
+
+    def infer() -> None:
+        fresh = replace(mdp)  # without what earlier tasks have prepared
+        phi, _ = expected_violations(fresh, starts, goals, steps)
+        rank_constraints(phi, [hypotheses.violated_by(path) for path in paths])
+
+    prepared = prepare(mdp, hypotheses, starts, goals, steps)
+    recorded = sum(len(path) for path in paths)
+    return [
+        Row(
+            f"{label}_discretize",
+            median_seconds(lambda: discretize(system, grid, actions, dt, hypotheses, samples), 5),
+            step_floor(system, grid, actions, dt, mdp),
+            5,
+            f"discretize: {what}; floor: its Runge-Kutta steps",
+        ),
+        Row(
+            f"{label}_infer_5",
+            median_seconds(infer),
+            sum(phi_floor(mdp, each) + exp_floor(mdp, each) for each in log_z),
+            7,
+            f"5 demonstrations to ranks, the model given: {what}; floor: exponentials and traffic",
+            "about 5 minutes on a single CPU core",
+        ),
+        Row(
+            f"{label}_rank_prepared_5",
+            median_seconds(lambda: prepared.rank(paths), 101),
+            float("nan"),
+            101,
+            f"5 demonstrations ({recorded} samples) to ranks, tasks known in advance: {what}",
+            "virtually instantaneous",
+        ),
+        Row(
+            f"{label}_rank_prepared_1",
+            median_seconds(lambda: prepared.rank(paths[:1], [0]), 101),
+            float("nan"),
+            101,
+            f"the same for one demonstration: {what}",
+            "virtually instantaneous",
+        ),
+    ]
+
+
+def telescope_tasks(settings: Settings) -> tuple[list[Floats], list[int], Sequence[Ints]]:
+    """Five unconstrained demonstrations within the bounds, and their tasks as cells."""
+    system, box, bounds = settings.model, settings.tasks.box(), settings.model.space.bounds
+    trials = sample_trials(
+        system,
+        None,
+        Box(np.maximum(box.lower, bounds.lower), np.minimum(box.upper, bounds.upper)),
+        trials=30,
+        seed=0,
+        horizon=settings.horizon,
+        dt=settings.demonstrations.dt,
+        goal_offsets=settings.tasks.goal_offsets,
+        restarts=1,
+    )
+    shown = demonstrate(system, trials, None, None, dt=settings.demonstrations.dt)
+    limits = system.control_box
+    kept = [
+        attempt.demonstration
+        for attempt in shown
+        if attempt.demonstration.controls is not None
+        and np.all(limits.contains(attempt.demonstration.controls))
+        and np.all(system.space.contains(attempt.demonstration.states))
+    ][:5]
+    starts = [int(settings.cells.index(each.task.start)) for each in kept]
+    return (
+        [each.states for each in kept],
+        starts,
+        [settings.cells.cells_in(each.task.goal) for each in kept],
+    )
+
+
+def demonstrator_rows() -> list[Row]:
+    """Safe set, and 100 tasks x 3 restarts of iLQR with the filter."""
+    grid = Grid(SYSTEM.space, (201, 201))
+    omega = solve(SYSTEM, grid, TRUTH)
+    margin = border_margin(SYSTEM, omega, 0.01)
+    box = Box(np.array([0.0, -2.0]), np.array([2 * np.pi, 2.0]))
+    trials = sample_trials(
+        SYSTEM, omega, box, trials=100, seed=0, horizon=5.0, dt=0.01, margin=margin
+    )
+    safety = SafetyFilter(SYSTEM, omega, 0.01, margin)
+    batch = np.zeros((8 * 300, 2)), np.zeros((8 * 300, 1))
+    calls = 500 * 10  # eight step sizes of all restarts, at each time step of each iteration
+    return [
+        Row(
+            "safe_set_201x201",
+            median_seconds(lambda: solve(SYSTEM, grid, TRUTH), 3),
+            float("nan"),
+            3,
+            "safe set of the pendulum, 201 x 201, to convergence",
+        ),
+        Row(
+            "demonstrate_100",
+            median_seconds(
+                lambda: demonstrate(SYSTEM, trials, TRUTH, safety, dt=0.01, goal_weight=300.0), 1
+            ),
+            calls * median_seconds(lambda: (SYSTEM.dynamics(*batch), safety.apply(*batch)), 25),
+            1,
+            "iLQR, 100 tasks x 3 restarts x 10 iterations; floor: its dynamics and filter calls",
+        ),
+    ]
