@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from paper_figures.style import COLUMN, GUIDE, OTHER_COLOURS, RC, new_figure
 
@@ -109,5 +110,7 @@ def _draw_panel(
     axes.axvline(PAPER_STATES, color=GUIDE, linewidth=0.6)
     axes.set_xscale("log")
     axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("states")
     axes.set_ylabel(label)

@@ -12,7 +12,7 @@ from experiments.tables import collate
 from tests.benchmark.configs import composed
 from tests.benchmark.timing import ROOT, Cost, Row, median_seconds
 
-FEW, MANY, RUN = 20, 120, 30  # points that are planned, and that run
+FEW, MANY, RUN = 20, 220, 30  # points that are planned, and that run
 
 
 def run(words: list[str], results: Path) -> tuple[float, float]:
