@@ -183,6 +183,7 @@ def _tasks(settings: AdviceSettings) -> list[Task]:
         seed=settings.seed,
         horizon=settings.horizon,
         dt=settings.horizon / _SAMPLES,
+        goal_offsets=settings.tasks.goal_offsets,
     )
     done = [
         attempt.demonstration.task

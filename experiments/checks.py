@@ -26,6 +26,7 @@ from experiments.settings import (
     Settings,
     StudySettings,
     SubjectSettings,
+    TaskSettings,
 )
 from mlci.spaces import StateSpace
 
@@ -36,6 +37,7 @@ _MOST_VALUES = 100_000_000  # of a safe set's grid: about 1 GB for each of its a
 _LONGEST = 1e8  # [s], three years
 _TAKEN = ("points", "store", "diffs", "inference")  # among the folders of results
 _RUNNABLE = ("missing", "failed", "stale")
+SAFE_SETS = ("equation", "escapes")
 
 _POSITIVE = (
     "horizon",
@@ -48,7 +50,14 @@ _POSITIVE = (
     "recorded_dt",
     "dts",
 )
-_NOT_NEGATIVE = ("seed", "safety.margin", "safety.width", "truth.cell", "calibration.sets")
+_NOT_NEGATIVE = (
+    "seed",
+    "safety.margin",
+    "safety.width",
+    "tasks.goal",
+    "truth.cell",
+    "calibration.sets",
+)
 _AT_LEAST_ONE = (
     "rollouts",
     "transition.samples",
@@ -187,7 +196,7 @@ def advice_problems(settings: AdviceSettings) -> Iterator[str]:
             for message in _length_problems(f"grids[{i}]", shape, space)
         ),
         *_subject_problems(settings),
-        *_region_problems("tasks", settings.tasks, space, point=True),
+        *_task_region_problems(settings.tasks, space),
     ]
     yield from before
     if not before and not settings.grids_to_try:
@@ -229,10 +238,14 @@ def truth_shape_problems(settings: Settings) -> Iterator[str]:
     """What a study has of regions beside the hypotheses."""
     space = settings.model.space
     yield from _length_problems("safety.shape", settings.safety.shape, space)
-    yield from _region_problems("tasks", settings.tasks, space)
+    yield from _task_region_problems(settings.tasks, space)
+    if settings.safety.method not in SAFE_SETS:
+        yield f"safety.method: {settings.safety.method!r} is none of {', '.join(SAFE_SETS)}"
     for i, region in enumerate(settings.truth.boxes):
         yield from _region_problems(f"truth.boxes[{i}]", region, space)
     truth = settings.truth
+    if settings.tasks.crossing and truth.name == NO_TRUTH:
+        yield "tasks.crossing: true, but no truth is there to cross; set it to false"
     nothing = not truth.boxes and truth.cell is None
     if nothing and truth.name != NO_TRUTH:
         yield (
@@ -243,6 +256,13 @@ def truth_shape_problems(settings: Settings) -> Iterator[str]:
         yield f"truth.name: {NO_TRUTH} means that nothing is forbidden; take another name"
     if truth.cell is not None and truth.boxes:
         yield f"truth.cell: {truth.cell} and {len(truth.boxes)} boxes are given; keep one of them"
+
+
+def _task_region_problems(tasks: TaskSettings, space: StateSpace) -> Iterator[str]:
+    """A box of tasks, or the reach of their goals, that does not fit the state space."""
+    yield from _region_problems("tasks", tasks, space, point=True)
+    if tasks.goal is not None:
+        yield from _length_problems("tasks.goal", tasks.goal, space)
 
 
 def task_problems(settings: RecordedSettings) -> Iterator[str]:

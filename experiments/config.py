@@ -96,7 +96,8 @@ def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
         ConfigError: listing every problem found.
     """
     problems = Problems()
-    known = {key: tree[key] for key in tree if key != "safety"}  # how to make demonstrations
+    # A system's config also says how to make demonstrations, and what is compared here.
+    known = {key: tree[key] for key in tree if key not in ("safety", "transition")}
     settings = parse(AdviceSettings, known, "", problems, {SystemSettings: _parse_system})
     for check in (
         lambda: advice_number_problems(settings),

@@ -36,6 +36,28 @@ class Region:
 
 
 @dataclass(frozen=True)
+class TaskSettings(Region):
+    """Where starts and goals are drawn, and which of the tasks count.
+
+    Attributes:
+        goal: how far the goal reaches around the state that was drawn for it, in each dimension;
+            None leaves that dimension free, and for `goal` itself makes it a point.
+        crossing: only tasks whose optimum, were there no constraint, enters the truth.
+    """
+
+    goal: tuple[float | None, ...] | None
+    crossing: bool
+
+    @property
+    def goal_offsets(self) -> Box | None:
+        """The goal region relative to its middle; None for a point."""
+        if self.goal is None:
+            return None
+        reach = np.array([np.inf if side is None else side for side in self.goal])
+        return Box(-reach, reach)
+
+
+@dataclass(frozen=True)
 class SystemSettings:
     """A subclass of mlci.systems.System by its dotted name, and its constructor's arguments."""
 
@@ -116,8 +138,9 @@ class DemonstrationSettings:
 
 @dataclass(frozen=True)
 class SafetySettings:
-    """The safe set's grid, and the filter's margin (None derives it) and blend width."""
+    """How the safe set is found, on which grid; the filter's margin (None: derived) and width."""
 
+    method: str
     shape: tuple[int, ...]
     margin: float | None
     width: float
@@ -193,7 +216,7 @@ class ModelSettings(SubjectSettings):
 class Settings(ModelSettings):
     """All that decides the result of one point, and nothing else."""
 
-    tasks: Region
+    tasks: TaskSettings
     truth: TruthSettings
     horizon: float
     demonstrations: DemonstrationSettings
@@ -242,7 +265,7 @@ class RecordedSettings(ModelSettings):
 class AdviceSettings(SubjectSettings):
     """Which discretisations to compare; conf/advise.yaml explains every value."""
 
-    tasks: Region
+    tasks: TaskSettings
     grid: GridSettings
     grids: tuple[tuple[int, ...], ...] | None
     dts: tuple[float, ...]

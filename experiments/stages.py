@@ -9,19 +9,23 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 import mlci.demonstrator
+import mlci.escapes
 import mlci.mdp
 import mlci.reachability
 import mlci.safety_filter
 from experiments.settings import Settings
 from experiments.store import Store, Stored
 from mlci.constraints import ConstraintSet
-from mlci.demonstrator import Outcome, demonstrate, sample_trials
+from mlci.demonstrator import Outcome, Trial, crossing, demonstrate, sample_trials
+from mlci.escapes import solve_escapes
 from mlci.grids import Grid
 from mlci.mdp import TabularMDP, action_grid, discretize
 from mlci.reachability import SafeSet, solve
@@ -31,6 +35,8 @@ from mlci.spaces import Box, Floats, Ints
 # What is stored of a tabular MDP: its own arrays, and those of the sparse matrix of crossings.
 _MOVES = ("successor", "reward", "allowed", "action")
 _CROSSINGS = ("indices", "indptr")
+
+_MOST_BATCHES = 20  # of tasks, among which enough must cross the truth where only those count
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +80,25 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
     """Omega of a truth (10), from the store or computed, and its key in the store."""
     grid = Grid(settings.model.space, settings.safety.shape)
 
+    escapes = settings.safety.method == "escapes"
+
     def compute() -> dict[str, np.ndarray]:
-        found = solve(settings.model, grid, settings.constraint)
+        system, truth = settings.model, settings.constraint
+        if escapes:
+            found = solve_escapes(system, grid, truth, horizon=settings.horizon)
+        else:
+            found = solve(system, grid, truth)
         return {"values": found.values, "gradients": found.gradients}
 
-    depends = (settings.system, _corners(settings.constraint), settings.safety.shape)
-    stored = store.get("safe_set", depends, [mlci.reachability, _system_module(settings)], compute)
+    depends: tuple[Any, ...] = (
+        settings.system,
+        _corners(settings.constraint),
+        settings.safety.shape,
+    )
+    if escapes:
+        depends = (*depends, settings.horizon)
+    source = mlci.escapes if escapes else mlci.reachability
+    stored = store.get("safe_set", depends, [source, _system_module(settings)], compute)
     return SafeSet(grid, stored["values"], stored["gradients"]), stored.key
 
 
@@ -93,29 +112,12 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
         filter_ = SafetyFilter(system, omega, chosen.dt, margin, safety.width)
 
     def compute() -> dict[str, np.ndarray]:
-        trials = sample_trials(
-            system,
-            omega,
-            task_box(settings),
-            trials=chosen.pairs,
-            seed=settings.seed,
-            horizon=settings.horizon,
-            dt=chosen.dt,
-            margin=margin or 0.0,
-            restarts=chosen.restarts,
-            hold=chosen.hold,
-        )
         attempts = demonstrate(
             system,
-            trials,
+            _trials(settings, omega, margin or 0.0),
             settings.constraint,
             filter_,
-            dt=chosen.dt,
-            goal_weight=chosen.goal_weight,
-            iterations=chosen.iterations,
-            goal_tolerance=chosen.goal_tolerance,
-            wind=chosen.wind,
-            limit=system.control_box if chosen.clip else None,
+            **_skill(settings),
         )
         shown = [attempt.demonstration for attempt in attempts]
         return {
@@ -140,6 +142,54 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
     )
     modules = [mlci.demonstrator, mlci.safety_filter, sys.modules[__name__]]
     return TrialSet(**store.get("demonstrations", depends, modules, compute))
+
+
+def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Trial]:
+    """The trials that the demonstrator tries.
+
+    Raises:
+        RuntimeError: too few tasks cross the truth, where only those are wanted.
+    """
+    system, chosen = settings.model, settings.demonstrations
+    draw = partial(
+        sample_trials,
+        system,
+        omega,
+        task_box(settings),
+        trials=chosen.pairs,
+        seed=settings.seed,
+        horizon=settings.horizon,
+        dt=chosen.dt,
+        margin=margin,
+        goal_offsets=settings.tasks.goal_offsets,
+        restarts=chosen.restarts,
+        hold=chosen.hold,
+    )
+    if not settings.tasks.crossing:
+        return draw()
+    found: list[Trial] = []
+    for batch in range(_MOST_BATCHES):
+        drawn = draw(first=batch * chosen.pairs)
+        found += crossing(system, drawn, settings.constraint, **_skill(settings))
+        if len(found) >= chosen.pairs:
+            return found[: chosen.pairs]
+    raise RuntimeError(
+        f"of {_MOST_BATCHES * chosen.pairs} tasks only {len(found)} would enter the truth if it "
+        "were not there: widen truth.boxes or tasks, or set tasks.crossing=false"
+    )
+
+
+def _skill(settings: Settings) -> dict[str, Any]:
+    """What `demonstrate` has to know of a demonstrator, beside tasks, truth and filter."""
+    chosen = settings.demonstrations
+    return {
+        "dt": chosen.dt,
+        "goal_weight": chosen.goal_weight,
+        "iterations": chosen.iterations,
+        "goal_tolerance": chosen.goal_tolerance,
+        "wind": chosen.wind,
+        "limit": settings.model.control_box if chosen.clip else None,
+    }
 
 
 def tabular_model(settings: Settings, store: Store) -> TabularMDP:

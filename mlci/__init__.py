@@ -30,6 +30,7 @@ __all__ = [
     "constraints",
     "demonstrations",
     "demonstrator",
+    "escapes",
     "grids",
     "ilqr",
     "inference",

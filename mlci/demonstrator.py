@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
@@ -82,6 +83,7 @@ def sample_trials(
     seed: int,
     horizon: float,
     dt: float,
+    first: int = 0,
     margin: float = 0.0,
     goal_offsets: Box | None = None,
     restarts: int = 3,
@@ -99,6 +101,7 @@ def sample_trials(
         seed: of the study; trial i depends on it and on i only.
         horizon: duration of a task [s].
         dt: sampling time [s], which divides the horizon.
+        first: index of the first trial.
         margin: V that starts and goals must have at least.
         goal_offsets: the goal region, relative to the goal state that was drawn; None for a point.
         restarts: R, guesses for each trial.
@@ -114,7 +117,7 @@ def sample_trials(
     offsets = Box.point(np.zeros(n)) if goal_offsets is None else goal_offsets
     per_hold = max(1, round(hold / dt))
     drawn = []
-    for trial in range(trials):
+    for trial in range(first, first + trials):
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
         start = _draw_safe(rng, start_box, safe_set, margin)
         goal = _draw_safe(rng, start_box, safe_set, margin)
@@ -187,6 +190,27 @@ def demonstrate(
         cost = float(solution.cost[own[best]])
         attempts.append(Attempt(demonstration, outcome, cost, float(misses[best]), best))
     return attempts
+
+
+def crossing(
+    system: System, trials: Sequence[Trial], truth: ConstraintSet, *, dt: float, **options: Any
+) -> list[Trial]:
+    """The trials for which the truth matters: the optimum, were it not there, enters it.
+
+    Args:
+        trials: at least one; those that the unconstrained demonstrator fails do not count.
+        dt: sampling time [s].
+        options: more of `demonstrate`'s arguments.
+    """
+    attempts = demonstrate(system, trials, None, None, dt=dt, **options)
+    states = np.array([attempt.demonstration.states for attempt in attempts])
+    controls = np.array([attempt.demonstration.controls for attempt in attempts])
+    entered = enters(system, truth, states, controls, dt)
+    return [
+        trial
+        for trial, attempt, through in zip(trials, attempts, entered, strict=True)
+        if attempt.outcome is Outcome.KEPT and through
+    ]
 
 
 def enters(

@@ -105,10 +105,10 @@ class Grid:
         return self.centers[cells, None, :] + offsets.reshape(-1, len(self.shape)) * self.widths
 
     def cells_in(self, region: Box) -> Ints:
-        """Numbers of the cells that stand for a region, sorted; empty if it is outside.
+        """Numbers of the cells that a region meets, sorted; empty if it is outside.
 
-        In each dimension these are the cells whose centre the region's side holds, or, where it
-        is narrower than that (a point, for one), the cell of its middle.
+        In a dimension in which the region is a point this is the cell that holds it; otherwise it
+        is every cell that the region enters, more than its edge.
         """
         chosen = []
         for d, axis in enumerate(self.axes):
@@ -117,15 +117,17 @@ class Grid:
                 continue
             middle = self.space.bounds.lower.copy()
             middle[d] = (region.lower[d] + region.upper[d]) / 2
-            probes = np.tile(middle, (len(axis), 1))
-            probes[:, d] = axis
-            inside = np.abs(self.space.difference(probes, middle)[:, d]) <= region.widths[d] / 2
-            if not inside.any():
+            if region.widths[d] == 0:
                 cell = int(self.index(middle))
                 if cell < 0:
                     return np.empty(0, dtype=np.int64)
-                inside[np.unravel_index(cell, self.shape)[d]] = True
-            chosen.append(np.flatnonzero(inside))
+                chosen.append(np.array([np.unravel_index(cell, self.shape)[d]]))
+                continue
+            probes = np.tile(middle, (len(axis), 1))
+            probes[:, d] = axis
+            apart = np.abs(self.space.difference(probes, middle)[:, d])
+            reach = (region.widths[d] + self.widths[d]) / 2
+            chosen.append(np.flatnonzero(apart < reach * (1 - 1e-12)))
         mesh = np.meshgrid(*chosen, indexing="ij")
         return np.sort(np.ravel_multi_index([part.ravel() for part in mesh], self.shape))
 

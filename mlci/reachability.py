@@ -60,6 +60,15 @@ class SafeSet:
         if not (np.all(np.isfinite(self.values)) and np.all(np.isfinite(self.gradients))):
             raise ValueError("the values and gradients of a safe set must be finite")
 
+    @classmethod
+    def from_values(cls, grid: Grid, values: Floats) -> SafeSet:
+        """The safe set of values (S,), with the means of their one-sided derivatives."""
+        one_sided = [
+            _one_sided(values.reshape(grid.shape), d, grid) for d in range(len(grid.shape))
+        ]
+        gradients = np.stack([(left + right).ravel() / 2 for left, right in one_sided], axis=-1)
+        return cls(grid, values, gradients)
+
     def value(self, states: ArrayLike) -> Floats:
         """V (...,) at states (..., n)."""
         return self.grid.interpolate(self.values, states)
@@ -145,9 +154,7 @@ def solve(
                 f"V still falls by {change:.2g} per second after {_LONGEST:g} s, more than the "
                 f"tolerance {tolerance:g}"
             )
-    one_sided = [_one_sided(values, d, grid) for d in range(values.ndim)]
-    gradients = np.stack([(left + right).ravel() / 2 for left, right in one_sided], axis=-1)
-    return SafeSet(grid, values.ravel(), gradients)
+    return SafeSet.from_values(grid, values.ravel())
 
 
 def _extremal_rates(system: System, grid: Grid) -> Floats:

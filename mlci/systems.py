@@ -86,6 +86,82 @@ class Pendulum(System):
 
 
 @dataclass(frozen=True, eq=False)
+class TelescopingPendulum(System):
+    """theta'' = g / l sin(theta) + u_1, l'' = u_2 (section VI); theta = 0 is upright.
+
+    A person who stands up or sits down: a mass on a leg of varying length, which leans but does not
+    go round. Lengths are in decimetres, in which the two controls cost alike (conf/system).
+
+    Attributes:
+        angle_limit: bound on |theta| [rad].
+        angular_speed_limit: bound on |theta'| [rad/s].
+        shortest: least l [dm].
+        longest: greatest l [dm].
+        speed_limit: bound on |l'| [dm/s].
+        torque_limit: bound on |u_1| [rad/s^2].
+        force_limit: bound on |u_2| [dm/s^2].
+        gravity: g [dm/s^2].
+    """
+
+    angle_limit: float = 1.2
+    angular_speed_limit: float = 2.0
+    shortest: float = 5.0
+    longest: float = 11.0
+    speed_limit: float = 3.0
+    torque_limit: float = 2.0
+    force_limit: float = 3.0
+    gravity: float = 10.0
+
+    def __post_init__(self) -> None:
+        _require_positive(
+            self,
+            "angle_limit",
+            "angular_speed_limit",
+            "shortest",
+            "longest",
+            "speed_limit",
+            "torque_limit",
+            "force_limit",
+        )
+        if not self.shortest < self.longest:
+            raise ValueError(
+                f"TelescopingPendulum.shortest must be below longest, not {self.shortest} and "
+                f"{self.longest}"
+            )
+
+    @cached_property
+    def space(self) -> StateSpace:
+        most = [self.angle_limit, self.angular_speed_limit, self.longest, self.speed_limit]
+        least = [-self.angle_limit, -self.angular_speed_limit, self.shortest, -self.speed_limit]
+        return StateSpace(
+            Box(np.array(least), np.array(most)),
+            np.zeros(4, dtype=bool),
+            ("angle", "angular_velocity", "length", "velocity"),
+            ("rad", "rad/s", "dm", "dm/s"),
+        )
+
+    @cached_property
+    def control_box(self) -> Box:
+        most = np.array([self.torque_limit, self.force_limit])
+        return Box(-most, most)
+
+    def dynamics(self, states: Floats, controls: Floats) -> Floats:
+        fall = self.gravity / states[..., 2] * np.sin(states[..., 0])
+        rates = states[..., 1], fall + controls[..., 0], states[..., 3], controls[..., 1]
+        return np.stack(np.broadcast_arrays(*rates), axis=-1)
+
+    def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
+        batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
+        angle, length = states[..., 0], states[..., 2]
+        by_state = np.zeros((*batch, 4, 4))
+        by_state[..., 0, 1] = by_state[..., 2, 3] = 1.0
+        by_state[..., 1, 0] = self.gravity / length * np.cos(angle)
+        by_state[..., 1, 2] = -self.gravity / length**2 * np.sin(angle)
+        push = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+        return by_state, np.broadcast_to(push, (*batch, 4, 2))
+
+
+@dataclass(frozen=True, eq=False)
 class DoubleIntegrator(System):
     """x'' = u: a mass on a line, whose safe sets and optimal controls are known exactly.
 

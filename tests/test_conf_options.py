@@ -35,12 +35,12 @@ def composed(*words: str, config: str = "config") -> Any:
 
 
 def companions(option: str) -> list[str]:
-    """The options that a system needs beside it, as the files of truths tell."""
+    """The truth that a system or grid needs beside it, as the files of truths tell."""
     group, _, name = option.partition("=")
-    if group == "system":
+    if group in ("system", "grid"):
         for truth in sorted((CONF / "truth").glob("*.yaml")):
             word = f"truth={truth.stem}"
-            if composed(word).hydra.runtime.choices.system == name:
+            if composed(word).hydra.runtime.choices[group] == name:
                 return [word]
     return []
 
@@ -59,7 +59,9 @@ def test_every_option_makes_a_point_that_can_run(option: str) -> None:
 
 @pytest.mark.parametrize("option", [name for name in OPTIONS if name.startswith(("sy", "gr"))])
 def test_every_option_suits_recorded_demonstrations(option: str) -> None:
-    read_recorded_config(plain_tree(composed(option, "demonstrations=x.csv", config="infer")))
+    choices = composed(option, *companions(option)).hydra.runtime.choices
+    words = dict.fromkeys([option, f"system={choices.system}", "demonstrations=x.csv"])
+    read_recorded_config(plain_tree(composed(*words, config="infer")))
 
 
 def test_every_group_is_in_the_defaults() -> None:

@@ -57,7 +57,9 @@ def test_every_system_suits_a_truth(system: str) -> None:
 
 @pytest.mark.parametrize("grid", options("grid"))
 def test_every_grid_has_the_cells_of_its_name(grid: str) -> None:
-    settings, _ = read_config(composed(f"grid={grid}"))
+    # The telescoping pendulum's cells have four sides.
+    system = ["truth=pain"] if grid == "2500" else []
+    settings, _ = read_config(composed(f"grid={grid}", *system))
     assert settings.cells.size == settings.columns["cells"] == int(grid)
 
 
@@ -139,8 +141,8 @@ WRONG = [
     ("system.speed_limit=-1", "system: Pendulum.speed_limit must be positive, not -1.0"),
     ("system.speed_limit=fast", "system.speed_limit: 'fast' is not a finite number"),
     ("~system._target_", "system._target_: missing"),
-    ("grid=300", "grid: there is no 300; there are 100, 400, 900, 1600"),
-    ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, wall"),
+    ("grid=300", "grid: there is no 300; there are 100, 400, 900, 1600, 2500"),
+    ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, pain, wall"),
     ("grdi=100", "grdi: unknown key; did you mean grid?"),
     ("dt=[1", "dt=[1: cannot be read as key=value"),
     ("dt", "dt: cannot be read as key=value"),
@@ -189,6 +191,11 @@ WRONG = [
     ("grid.offset=[0.5]", "grid.offset: [0.5] must have 2 entries, one each for angle"),
     ("grid.offset=[1,0]", "grid.offset: [1.0, 0.0] must be shares of a cell, from 0 to below 1"),
     ("grid.offset=[0,0.5]", "grid.offset: [0.0, 0.5] shifts angular_velocity, which has ends"),
+    ("tasks.goal=[0.1]", "tasks.goal: [0.1] must have 2 entries, one each for angle"),
+    ("tasks.goal=[0.1,-1]", "tasks.goal: [0.1, -1.0] must not be below 0"),
+    ("tasks.lower=[null,3.0]", "tasks: angular_velocity goes from 3.0 to 2.0"),
+    ("tasks.crossing=1", "tasks.crossing: 1 is not true or false"),
+    ("safety.method=magic", "safety.method: 'magic' is none of equation, escapes"),
     ("truth.boxes=[{lower:[0],upper:[1]}]", "truth.boxes[0].lower: [0.0] must have 2 entries"),
     ("truth.boxes=[{lower:[0,1],upper:[1,0]}]", "angular_velocity goes from 1.0 to 0.0"),
     ("truth.boxes=[{lower:[0,null],upper:[1,0]}]", "angular_velocity has one side only"),
@@ -278,6 +285,13 @@ def test_a_hypothesis_or_nothing_can_be_the_truth() -> None:
     assert one != other
 
 
+def test_tasks_cannot_cross_what_is_not_there(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = refusal(["truth=none", "tasks.crossing=true"], monkeypatch, capsys)
+    assert "tasks.crossing: true, but no truth is there to cross; set it to false" in said
+
+
 def test_all_wrong_points_of_a_sweep_are_reported_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -291,7 +305,10 @@ def test_all_wrong_points_of_a_sweep_are_reported_at_once(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["-m", "grid=100,300"], "grid: there is no 300; there are 100, 400, 900, 1600 [1 of 2"),
+        (
+            ["-m", "grid=100,300"],
+            "grid: there is no 300; there are 100, 400, 900, 1600, 2500 [1 of 2",
+        ),
         (["-m", "experiment=paper,other"], "experiment=paper,other: a sweep over experiments"),
         (["-m", "study=a,b"], "study=a,b: this changes no result"),
         (["-m", "dt=interval(0,1)"], "dt=interval(0,1): cannot be swept; list its values"),

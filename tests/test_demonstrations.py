@@ -5,7 +5,7 @@ import pytest
 
 from mlci.constraints import ConstraintSet
 from mlci.demonstrations import Demonstration, Task
-from mlci.demonstrator import Outcome, Trial, demonstrate, enters, sample_trials
+from mlci.demonstrator import Outcome, Trial, crossing, demonstrate, enters, sample_trials
 from mlci.grids import Grid
 from mlci.ilqr import optimize
 from mlci.reachability import solve
@@ -71,6 +71,30 @@ def test_a_trial_does_not_depend_on_how_many_there_are():
         for number in (*item.task.start, *item.task.goal.lower, *np.unique(item.guesses))
     ]
     assert len(set(drawn)) == 8 * (2 + 2 + 3 * 10)
+
+
+def test_trials_may_be_drawn_in_batches():
+    whole, part = draw(trials=8), draw(trials=3, first=5)
+    for one, other in zip(whole[5:], part, strict=True):
+        assert np.array_equal(one.task.start, other.task.start)
+        assert np.array_equal(one.guesses, other.guesses)
+
+
+def test_crossing_trials_are_those_whose_optimum_enters_the_truth():
+    trials = draw(trials=15)
+    attempts = demonstrate(PENDULUM, trials, None, None, dt=DT)
+    expected = []
+    for item, attempt in zip(trials, attempts, strict=True):
+        path = attempt.demonstration.states
+        fine = path[:-1, None] + np.linspace(0, 1, 50)[:, None] * np.diff(path, axis=0)[:, None]
+        angle, speed = fine[..., 0] % (2 * np.pi), fine[..., 1]
+        through = (angle > np.pi) & (angle < 1.2 * np.pi) & (speed > 0) & (speed < 1.2)
+        if attempt.outcome is Outcome.KEPT and through.any():
+            expected.append(item)
+    assert 0 < len(expected) < 15
+    assert crossing(PENDULUM, trials, TRUTHS, dt=DT) == expected
+    # Nobody who fails without a truth tells anything about it.
+    assert crossing(PENDULUM, trials, TRUTHS, dt=DT, goal_tolerance=1e-12) == []
 
 
 def test_starts_and_goals_fill_the_safe_part_of_the_box(safe_set):

@@ -73,13 +73,16 @@ def test_points_inside_are_the_centres_of_a_finer_grid(shape, samples):
         ([2.3, 1.0], [2.3, 1.0], [3], [1]),  # a point
         ([8.3, 1.0], [8.3, 1.0], [3], [1]),  # the same point, a turn later
         ([0.4, 0.2], [2.6, 1.0], [1, 2, 3], [0, 1]),
-        ([0.6, 0.2], [2.4, 1.0], [2], [0, 1]),  # the centres 0.5 and 2.5 stay outside
-        ([4.2, 2.9], [6.0, 3.0], [0, 5], [4]),  # across the wrap; no centre in the second side
+        ([0.9, 0.2], [2.1, 1.2], [1, 2, 3], [0, 1]),  # corners of cells are enough, edges are not
+        ([2.3, 1.4], [2.4, 1.9], [3], [2, 3]),  # thinner than a cell
+        ([4.2, 2.9], [5.9, 3.0], [0, 5], [4]),  # across the wrap
+        ([4.2, 2.9], [6.1, 3.6], [0, 1, 5], [4]),  # and beyond the bounds
         ([-np.inf, 1.0], [np.inf, 1.0], [0, 1, 2, 3, 4, 5], [1]),
         ([0.5, -np.inf], [0.5, np.inf], [1], [0, 1, 2, 3, 4]),
         ([-1.0, 0.0], [5.0, 3.0], [0, 1, 2, 3, 4, 5], [0, 1, 2, 3, 4]),
         ([-9.0, 0.0], [9.0, 0.4], [0, 1, 2, 3, 4, 5], [0]),  # wider than the period
         ([0.5, 3.5], [0.5, 4.0], [], []),  # outside
+        ([0.5, 3.5], [0.5, 3.5], [], []),  # a point outside
     ],
 )
 def test_cells_in(lower, upper, rows, columns):

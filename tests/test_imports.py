@@ -22,6 +22,7 @@ MAY_IMPORT = {
     "systems": SPACES,
     "simulate": MOTION,
     "reachability": SETS | MOTION,
+    "escapes": SETS | MOTION | {"reachability"},
     "safety_filter": SETS | MOTION | {"reachability"},
     "ilqr": MOTION,
     "demonstrations": SPACES,

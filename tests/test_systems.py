@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from mlci.simulate import rollout
-from mlci.systems import DoubleIntegrator, Pendulum
+from mlci.systems import DoubleIntegrator, Pendulum, TelescopingPendulum
 
-SYSTEMS = [Pendulum(gravity=9.81, length=0.7), DoubleIntegrator()]
+SYSTEMS = [Pendulum(gravity=9.81, length=0.7), DoubleIntegrator(), TelescopingPendulum()]
 
 
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda system: type(system).__name__)
@@ -51,6 +51,28 @@ def test_parameters_set_the_state_space_and_the_control_box():
     mass = DoubleIntegrator(position_limit=5.0, speed_limit=2.0, control_limit=0.5)
     np.testing.assert_array_equal(mass.space.bounds.vertices()[[0, 3]], [[-5, -2], [5, 2]])
     np.testing.assert_array_equal(mass.control_box.vertices(), [[-0.5], [0.5]])
+    leg = TelescopingPendulum(angle_limit=1.0, shortest=4.0, longest=8.0, force_limit=0.5)
+    np.testing.assert_array_equal(leg.space.bounds.lower, [-1, -2, 4, -3])
+    np.testing.assert_array_equal(leg.space.bounds.upper, [1, 2, 8, 3])
+    np.testing.assert_array_equal(leg.control_box.upper, [2, 0.5])
+    assert not leg.space.periodic.any()
+
+
+def test_a_telescoping_pendulum_of_constant_length_is_a_pendulum():
+    telescope, pendulum = TelescopingPendulum(gravity=3.0), Pendulum(gravity=3.0, length=6.5)
+    torques = np.linspace(-1, 1, 50)[:, None]
+    path = rollout(telescope, [0.2, -0.3, 6.5, 0.0], np.hstack([torques, 0 * torques]), 0.05)
+    expected = rollout(pendulum, [0.2, -0.3], torques, 0.05)
+    np.testing.assert_allclose(path[:, :2], expected, atol=1e-12)
+    np.testing.assert_array_equal(path[:, 2:], np.tile([6.5, 0.0], (51, 1)))
+
+
+def test_a_leg_lengthens_under_a_constant_force_whatever_the_angle():
+    forces = np.tile([0.7, 2.0], (20, 1))
+    path = rollout(TelescopingPendulum(), [0.4, 0.5, 5.5, -1.0], forces, 0.1)
+    time = np.linspace(0, 2, 21)
+    np.testing.assert_allclose(path[:, 2], 5.5 - time + time**2, atol=1e-12)
+    np.testing.assert_allclose(path[:, 3], 2.0 * time - 1.0, atol=1e-12)
 
 
 def test_running_reward_is_minus_the_squared_control():
@@ -67,6 +89,9 @@ def test_running_reward_is_minus_the_squared_control():
         (DoubleIntegrator, "position_limit"),
         (DoubleIntegrator, "speed_limit"),
         (DoubleIntegrator, "control_limit"),
+        *((TelescopingPendulum, f"{name}_limit") for name in ("angle", "angular_speed", "speed")),
+        *((TelescopingPendulum, name) for name in ("torque_limit", "force_limit")),
+        *((TelescopingPendulum, name) for name in ("shortest", "longest")),
     ],
 )
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
@@ -74,3 +99,8 @@ def test_parameters_that_are_not_positive_are_refused(make, parameter, value):
     message = rf"{make.__name__}\.{parameter} must be positive, not {value}"
     with pytest.raises(ValueError, match=message):
         make(**{parameter: value})
+
+
+def test_a_leg_that_cannot_lengthen_is_refused():
+    with pytest.raises(ValueError, match=r"shortest must be below longest, not 5\.0 and 5\.0"):
+        TelescopingPendulum(longest=5.0)
