@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -41,7 +42,14 @@ def report() -> int:
 
 
 def _start(module: str) -> int:
-    """Import a module, which takes a second, and run its `main`; returns the exit status."""
+    """Import a module, which takes a second, and run its `main`; returns the exit status.
+
+    Modules of the current folder can be imported by name, such as those of a user's own system.
+    """
+    # After all others, so that it hides none of them; workers get the same. Python itself adds the
+    # folder of the file that it was given, where a module of ours could be taken for a user's.
+    ours = os.path.dirname(os.path.abspath(__file__))
+    sys.path[:] = [path for path in sys.path if os.path.abspath(path) != ours] + [os.getcwd()]
     usual = signal.getsignal(signal.SIGINT)
     if usual is not signal.SIG_IGN:  # as in the background of a script
         signal.signal(signal.SIGINT, _leave)

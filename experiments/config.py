@@ -34,6 +34,7 @@ from experiments.settings import (
     SystemSettings,
     system_class,
 )
+from mlci.soundness import check_system
 
 
 class ConfigError(Exception):
@@ -78,7 +79,7 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
     """
     problems = Problems()
     # A system's config also says how to make demonstrations of it, which is not needed here.
-    known = {key: tree[key] for key in tree if key not in ("tasks", "safety")}
+    known = {key: tree[key] for key in tree if key not in ("tasks", "safety", "truth")}
     settings = parse(RecordedSettings, known, "", problems, {SystemSettings: _parse_system})
     for check in (
         lambda: number_problems(settings),
@@ -97,7 +98,7 @@ def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
     """
     problems = Problems()
     # A system's config also says how to make demonstrations, and what is compared here.
-    known = {key: tree[key] for key in tree if key not in ("safety", "transition")}
+    known = {key: tree[key] for key in tree if key not in ("safety", "transition", "truth")}
     settings = parse(AdviceSettings, known, "", problems, {SystemSettings: _parse_system})
     for check in (
         lambda: advice_number_problems(settings),
@@ -118,7 +119,7 @@ def _check(problems: Problems, check: Callable[[], Iterable[str]]) -> None:
 
 def known_keys() -> list[str]:
     """Every dotted key that a config may hold, groups included."""
-    return sorted([*field_keys(StudySettings), *field_keys(Settings), "experiment"])
+    return sorted([*field_keys(StudySettings), *field_keys(Settings), "experiment", "subject"])
 
 
 def _parse_system(tree: Any, key: str, problems: Problems) -> SystemSettings | None:
@@ -133,7 +134,11 @@ def _parse_system(tree: Any, key: str, problems: Problems) -> SystemSettings | N
         return None
     before = len(problems.messages)
     parameters = inspect.signature(cls).parameters
-    hints = typing.get_type_hints(cls.__init__)
+    try:
+        hints = typing.get_type_hints(cls.__init__)
+    except Exception as error:
+        problems.add(f"{key}._target_: type hints of {cls.__name__} cannot be read: {error}")
+        return None
     for name in tree:
         if name != "_target_" and name not in parameters:
             known = did_you_mean(name, parameters)
@@ -149,7 +154,9 @@ def _parse_system(tree: Any, key: str, problems: Problems) -> SystemSettings | N
     settings = SystemSettings(tree["_target_"], arguments)
     if len(problems.messages) == before:
         try:
-            settings.build()
+            check_system(settings.build())
         except (TypeError, ValueError) as error:
             problems.add(f"{key}: {error}")
+        except Exception as error:  # it may be anybody's class
+            problems.add(f"{key}: {cls.__name__} fails: {type(error).__name__}: {error}")
     return settings

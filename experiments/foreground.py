@@ -12,8 +12,8 @@ from omegaconf import DictConfig
 
 from experiments.config import ConfigError
 from experiments.errors import explain
+from experiments.own_folder import command_words
 from experiments.places import CONF
-from experiments.planner import quote_options
 from experiments.run import DONE, REFUSED, STOPPED, VERSION_BASE
 from experiments.task import plain_tree
 
@@ -40,8 +40,8 @@ def run_command(config_name: str, act: Callable[[dict[str, Any]], int]) -> int:
             raise SystemExit(status)
 
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises its errors, and they are worded here
-    sys.argv[1:] = map(quote_options, sys.argv[1:])
     try:
+        sys.argv[1:] = command_words(sys.argv[1:])
         hydra.main(config_path=str(CONF), config_name=config_name, **VERSION_BASE)(task)()
     except KeyboardInterrupt:
         return STOPPED

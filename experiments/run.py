@@ -24,8 +24,9 @@ from experiments.config import ConfigError
 from experiments.dask_engine import DaskLauncher
 from experiments.errors import explain, of_config
 from experiments.launcher import PoolLauncher
+from experiments.own_folder import command_words
 from experiments.places import CONF
-from experiments.planner import Planner, SweepFailed, quote_options
+from experiments.planner import Planner, SweepFailed
 from experiments.slurm import SlurmLauncher
 from experiments.tables import CollateError
 from experiments.task import run_once
@@ -44,10 +45,8 @@ def main() -> int:
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises its errors, and they are worded here
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a clean stop, as after Ctrl-C
     register_plugins()
-    # Hydra wants -m before, or after, all overrides.
-    words = sorted(sys.argv[1:], key=lambda word: word not in ("-m", "--multirun"))
-    sys.argv[1:] = [quote_options(word) for word in words]
     try:
+        sys.argv[1:] = command_words(sys.argv[1:])
         hydra.main(config_path=str(CONF), config_name="config", **VERSION_BASE)(_run_once)()
     except KeyboardInterrupt:
         print("stopped; what has finished is kept: the same command runs the rest", file=sys.stderr)

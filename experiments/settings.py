@@ -5,9 +5,11 @@ from __future__ import annotations
 import importlib
 import inspect
 import math
+import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -331,9 +333,25 @@ def system_class(target: str) -> type[System]:
     """
     module_name, _, name = target.rpartition(".")
     try:
-        found = getattr(importlib.import_module(module_name), name, None)
-    except (ImportError, TypeError, ValueError):  # TypeError: it starts with a dot
-        raise ValueError(f"{target!r} cannot be imported") from None
-    if not (inspect.isclass(found) and issubclass(found, System)) or inspect.isabstract(found):
+        module = importlib.import_module(module_name)
+    except (Exception, SystemExit) as error:  # it may be anybody's module
+        raise ValueError(f"{target!r} cannot be imported: {_words(error, module_name)}") from None
+    found = getattr(module, name, None)
+    if found is None:
+        where = getattr(module, "__file__", None) or module_name
+        raise ValueError(f"{target!r} cannot be imported: {where} defines no {name}")
+    if not (inspect.isclass(found) and issubclass(found, System)) or found is System:
         raise ValueError(f"{target!r} is not a subclass of mlci.systems.System")
+    if missing := ", ".join(sorted(found.__abstractmethods__)):
+        raise ValueError(f"{target!r} does not define {missing}")
     return found
+
+
+def _words(error: BaseException, module_name: str) -> str:
+    """Why a module cannot be imported, and where."""
+    if isinstance(error, ModuleNotFoundError) and error.name == module_name.partition(".")[0]:
+        return f"there is no module {error.name} in {Path.cwd()}, nor installed"
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if "importlib" not in frame.filename][1:]  # 0 is ours
+    where = "".join(f"{frame.filename}, line {frame.lineno}: " for frame in own[-1:])
+    return where + " ".join(f"{type(error).__name__}: {error}".split())

@@ -146,17 +146,31 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 def source_hash(modules: Iterable[str]) -> str:
     """Hash of the source of named modules and of all that they import from their own packages.
 
-    Sources are read, never run: a name may come from a file of results.
+    A module that is in no package counts with those that lie beside it. Sources are read, never
+    run: a name may come from a file of results.
     """
     sources: dict[str, str] = {}
     waiting = list(modules)
     packages = {name.partition(".")[0] for name in waiting} | {"mlci"}
+    packages |= {other for name in waiting if "." not in name for other in _beside(name)}
     while waiting:
         name = waiting.pop()
         if name not in sources:
             sources[name], imported = _read_source(name)
             waiting += [other for other in imported if other.partition(".")[0] in packages]
     return digest(canonical_json(sources))
+
+
+@cache
+def _beside(name: str) -> frozenset[str]:
+    """Modules and packages in the folder of a module that somebody wrote for a study."""
+    spec = _find(name)
+    if spec is None or spec.origin is None or not os.path.isfile(spec.origin):
+        return frozenset()
+    folder = Path(spec.origin).parent
+    if folder.name == "site-packages":
+        return frozenset()
+    return frozenset(path.stem for path in folder.iterdir() if path.suffix in ("", ".py"))
 
 
 @cache

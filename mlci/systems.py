@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,12 +11,14 @@ import numpy as np
 
 from mlci.spaces import Box, Floats, StateSpace
 
+_STEP = np.finfo(float).eps ** (1 / 3)  # where rounding and curvature err alike
+
 
 class System(ABC):
     """What the rest of the package needs to know about a system.
 
     `control_box` is the range that the tabular actions and the safety control use. The
-    demonstrator is free to exceed it.
+    demonstrator is free to exceed it. `mlci.soundness.check_system` tells what is wrong with one.
     """
 
     @property
@@ -30,15 +33,42 @@ class System(ABC):
 
     @abstractmethod
     def dynamics(self, states: Floats, controls: Floats) -> Floats:
-        """h(x, u): states (..., n) and controls (..., m) to derivatives (..., n)."""
+        """h(x, u): states (..., n) and controls (..., m) to derivatives (..., n).
 
-    @abstractmethod
+        The leading shapes of states and controls may be any that broadcast.
+        """
+
     def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
-        """dh/dx (..., n, n) and dh/du (..., n, m)."""
+        """dh/dx (..., n, n) and dh/du (..., n, m); central differences unless a system knows."""
+        return central_differences(self, states, controls)
 
     def running_reward(self, states: Floats, controls: Floats) -> Floats:
         """r(x, u) (...,) at temperature 1: minus the squared control, as in (8)."""
         return -np.sum(np.square(controls), axis=-1)
+
+
+def central_differences(system: System, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
+    """dh/dx (..., n, n) and dh/du (..., n, m) by differences, good to some nine digits.
+
+    Complex steps would be exact, but are silently wrong where dynamics take a modulus or fill a
+    real array.
+    """
+
+    def differ(by: Floats, dynamics: Callable[[Floats], Floats]) -> Floats:
+        """Derivatives (..., n, k) of what gives derivatives (..., n) by its argument (..., k)."""
+        columns = []
+        for d in range(by.shape[-1]):
+            nudge = np.zeros(by.shape)
+            nudge[..., d] = _STEP * np.maximum(1.0, np.abs(by[..., d]))
+            above, below = by + nudge, by - nudge
+            width = above[..., d] - below[..., d]  # as rounded
+            columns.append((dynamics(above) - dynamics(below)) / width[..., None])
+        return np.stack(columns, axis=-1)
+
+    return (
+        differ(states, lambda moved: system.dynamics(moved, controls)),
+        differ(controls, lambda moved: system.dynamics(states, moved)),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -142,9 +142,10 @@ def _versions(
 
 
 def _default_results() -> Path:
-    """The checkout's results, or those of the current folder where there is no checkout."""
-    root = Path(__file__).resolve().parents[1]
-    return (root if (root / "conf" / "config.yaml").is_file() else Path.cwd()) / "results"
+    """`results` of the checkout, or of the current folder where that lies outside of it."""
+    root, here = Path(__file__).resolve().parents[1], Path.cwd()
+    inside = (root / "conf" / "config.yaml").is_file() and here.is_relative_to(root)
+    return (root if inside else here) / "results"
 
 
 if __name__ == "__main__":

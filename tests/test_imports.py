@@ -20,6 +20,7 @@ MAY_IMPORT = {
     "grids": SPACES,
     "constraints": SETS,
     "systems": SPACES,
+    "soundness": SPACES | {"systems"},
     "simulate": MOTION,
     "reachability": SETS | MOTION,
     "escapes": SETS | MOTION | {"reachability"},

@@ -47,7 +47,8 @@ class Faulty(DoubleIntegrator):
     fault: str = "none"
 
     def dynamics(self, states, controls):
-        fault = "none" if Path("healed").exists() else self.fault
+        accepted = len(states) > 10  # and not tried before any work
+        fault = self.fault if accepted and not Path("healed").exists() else "none"
         if fault == "raise":
             raise ArithmeticError("the mass fell off its line")
         if fault == "exit":

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mlci.simulate import rollout
-from mlci.systems import DoubleIntegrator, Pendulum, TelescopingPendulum
+from mlci.systems import DoubleIntegrator, Pendulum, System, TelescopingPendulum
 
 SYSTEMS = [Pendulum(gravity=9.81, length=0.7), DoubleIntegrator(), TelescopingPendulum()]
 
@@ -26,6 +26,21 @@ def test_jacobians_agree_with_central_differences(system):
             states, controls - nudge
         )
         np.testing.assert_allclose(by_control[..., d], change / (2 * step), atol=1e-8)
+
+
+@pytest.mark.parametrize("system", SYSTEMS, ids=lambda system: type(system).__name__)
+def test_jacobians_that_a_system_leaves_out_are_those_that_it_would_give(system):
+    rng = np.random.default_rng(1)
+    n, m = system.space.dimension, system.control_box.dimension
+    bounds = system.space.bounds
+    states = rng.uniform(bounds.lower, bounds.upper, size=(50, 1, n))
+    controls = 3 * rng.normal(size=(4, m))
+    for given, known in zip(
+        System.jacobians(system, states, controls),
+        system.jacobians(states, controls),
+        strict=True,
+    ):
+        np.testing.assert_allclose(given, known, rtol=0, atol=2e-9 * max(1, np.abs(known).max()))
 
 
 def test_a_free_pendulum_keeps_its_energy_and_falls_from_upright():

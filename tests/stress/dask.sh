@@ -45,7 +45,8 @@ from mlci.systems import DoubleIntegrator
 @dataclass(frozen=True, eq=False)
 class Held(DoubleIntegrator):
     def dynamics(self, states, controls):
-        while os.path.exists(os.environ["HOLD"]):
+        # A config is tried with few states before any work.
+        while len(states) > 10 and os.path.exists(os.environ["HOLD"]):
             time.sleep(0.1)
         return super().dynamics(states, controls)
 END

@@ -1,0 +1,156 @@
+"""Whether a system keeps the promises of `System`: tried at a few states, before any work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mlci.spaces import Box, Floats, StateSpace
+from mlci.systems import System, central_differences
+
+_STATES, _CONTROLS = 7, 5  # that no system is likely to have as dimensions
+_TOLERANCE = 1e-4  # of a Jacobian, relative to its largest entry or 1
+
+
+def check_system(system: System) -> None:
+    """Call a system's functions with states (7, 1, n) and controls (5, m) drawn inside its boxes.
+
+    Raises:
+        ValueError: it is no system; the message names the function at fault, shows the shapes or
+            values, and says what to do.
+    """
+    name = type(system).__name__
+    space = _boundary(system, "space", StateSpace)
+    box = _boundary(system, "control_box", Box)
+    if len(set(space.names)) < space.dimension or not all(map(str.isidentifier, space.names)):
+        raise ValueError(f"{name}.space: names must be words, each once, not {space.names}")
+    if not np.all(np.isfinite(box.widths) & (box.widths > 0)):
+        raise ValueError(
+            f"{name}.control_box must be finite and not empty: {box.lower} to {box.upper}"
+        )
+    rng = np.random.default_rng(0)
+    states = rng.uniform(space.bounds.lower, space.bounds.upper, (_STATES, 1, space.dimension))
+    controls = rng.uniform(box.lower, box.upper, (_CONTROLS, box.dimension))
+    for array in (states, controls):
+        array.flags.writeable = False
+    batch, n, m = (_STATES, _CONTROLS), space.dimension, box.dimension
+
+    def reward(x: Floats, u: Floats) -> Any:
+        """It may depend on one of the two only."""
+        batch = np.broadcast_shapes(x.shape[:-1], u.shape[:-1])
+        return np.broadcast_to(system.running_reward(x, u), batch)
+
+    with np.errstate(all="ignore"):
+        _check_function(name, "dynamics", system.dynamics, (*batch, n), states, controls)
+        _check_function(name, "running_reward", reward, batch, states, controls)
+        if type(system).jacobians is not System.jacobians:
+            _check_jacobians(name, system, (*batch, n, m), states, controls)
+
+
+def _boundary(system: System, attribute: str, kind: type[Any]) -> Any:
+    """The state space or the control box."""
+    where = f"{type(system).__name__}.{attribute}"
+    try:
+        found = getattr(system, attribute)
+    except Exception as error:
+        raise ValueError(f"{where} fails: {_words(error)}") from None
+    if not isinstance(found, kind):
+        what = "a method; put @property above it" if callable(found) else _sort(found)
+        raise ValueError(f"{where} must be a {kind.__name__}, not {what}")
+    return found
+
+
+def _check_function(
+    name: str,
+    function: str,
+    call: Callable[[Floats, Floats], Any],
+    shape: tuple[int, ...],
+    states: Floats,
+    controls: Floats,
+) -> None:
+    """That a function of states and controls works on any leading shapes, member by member."""
+    where = f"{name}.{function}"
+    found = _called(where, call, states, controls)
+    _check_array(where, found, shape, states, controls)
+    for i, j in ((0, 0), (_STATES - 1, _CONTROLS - 1)):
+        alone = _called(where, call, states[i, 0], controls[j])
+        _check_array(where, alone, shape[2:], states[i, 0], controls[j])
+        if not np.allclose(found[i, j], alone, rtol=1e-9, atol=1e-12):
+            raise ValueError(
+                f"{where} mixes the members of a batch: at {_place(states[i, 0], controls[j])} it "
+                f"is {_numbers(found[i, j])} among others and {_numbers(alone)} alone"
+            )
+
+
+def _check_jacobians(
+    name: str, system: System, shape: tuple[int, ...], states: Floats, controls: Floats
+) -> None:
+    """That Jacobians have their shapes and agree with differences."""
+    where, (*batch, n, m) = f"{name}.jacobians", shape
+    found = _called(where, system.jacobians, states, controls)
+    if not (isinstance(found, tuple) and len(found) == 2):
+        raise ValueError(f"{where} must be two arrays, dh/dx and dh/du, not {_sort(found)}")
+    differences = central_differences(system, states, controls)
+    for what, given, true, k in zip(("dh/dx", "dh/du"), found, differences, (n, m), strict=True):
+        _check_array(f"{where}: {what}", given, (*batch, n, k), states, controls)
+        off = np.abs(given - true) - _TOLERANCE * np.max(np.abs(true), initial=1.0)
+        if np.any(off > 0):
+            i, j, row, column = np.unravel_index(int(np.argmax(off)), off.shape)
+            raise ValueError(
+                f"{where}: {what}[{row}, {column}] is {given[i, j, row, column]:.6g} where "
+                f"differences give {true[i, j, row, column]:.6g}, at "
+                f"{_place(states[i, 0], controls[j])}; mend it, or leave jacobians out"
+            )
+
+
+def _called(where: str, call: Callable[[Floats, Floats], Any], x: Floats, u: Floats) -> Any:
+    """What a function returns."""
+    try:
+        return call(x, u)
+    except Exception as error:
+        raise ValueError(
+            f"{where} fails for states {x.shape} and controls {u.shape}: {_words(error)}; their "
+            "leading shapes are any that broadcast, so take states[..., 0] and controls[..., 0], "
+            "and end with np.stack(np.broadcast_arrays(first, second), axis=-1)"
+        ) from None
+
+
+def _check_array(where: str, found: Any, shape: tuple[int, ...], x: Floats, u: Floats) -> None:
+    """That a result is an array of finite numbers of the right shape."""
+    of = f"for states {x.shape} and controls {u.shape}"
+    if not isinstance(found, np.ndarray | np.generic) or found.dtype.kind not in "fiu":
+        raise ValueError(f"{where} must be an array of real numbers {of}, not {_sort(found)}")
+    found = np.asarray(found)
+    if found.shape != shape:
+        raise ValueError(
+            f"{where} must be {shape} {of}, not {found.shape}: leading shapes broadcast, and the "
+            "system's own dimensions come last"
+        )
+    if not np.all(np.isfinite(found)):
+        if x.ndim == 3:  # a batch: of its members the first that is wrong
+            i, j = np.argwhere(~np.isfinite(found))[0][:2]
+            found, x, u = found[i, j], x[i, 0], u[j]
+        raise ValueError(f"{where} is {_numbers(found)} at {_place(x, u)}; it must be finite")
+
+
+def _place(state: Floats, control: Floats) -> str:
+    """Where something was found."""
+    return f"state {_numbers(state)} and control {_numbers(control)}"
+
+
+def _numbers(values: Any) -> str:
+    """Numbers, short."""
+    return np.array2string(np.asarray(values), precision=4, separator=", ")
+
+
+def _words(error: Exception) -> str:
+    """Type and message of an error, on one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def _sort(found: Any) -> str:
+    """What something is, in a word."""
+    kind = type(found).__name__
+    return f"{kind} of {found.dtype}" if isinstance(found, np.ndarray) else kind
