@@ -28,7 +28,7 @@ from mlci.maxent import log_partition, reachable, violation_probabilities
 from mlci.mdp import action_grid, discretize
 from mlci.metrics import MOST_UNREACHABLE, Diagnosis, diagnose
 from mlci.simulate import step_count
-from mlci.spaces import Bools, Box, Floats
+from mlci.spaces import Bools, Floats
 
 _SAMPLES = 100  # of the paths that show which tasks can be done
 # A remedy that takes more moves is not tried: some 30 s and 1 GB.
@@ -171,14 +171,10 @@ def _tasks(settings: AdviceSettings) -> list[Task]:
         ConfigError: there is none.
     """
     system, limits = settings.model, settings.model.control_box
-    box, bounds = settings.tasks.box(), system.space.bounds
     drawn = sample_trials(
         system,
         None,
-        Box(
-            np.where(np.isfinite(box.lower), box.lower, bounds.lower),
-            np.where(np.isfinite(box.upper), box.upper, bounds.upper),
-        ),
+        settings.tasks.start_box(system.space),
         trials=settings.pairs,
         seed=settings.seed,
         horizon=settings.horizon,

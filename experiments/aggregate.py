@@ -31,7 +31,7 @@ import pandas as pd
 from mlci.spaces import Floats, Ints
 
 _RESAMPLES = 1000
-_TAILS = (0.025, 0.975)  # of a 95 % interval
+TAILS = (0.025, 0.975)  # of a 95 % interval
 
 
 def study_tables(tables: Mapping[str, Path]) -> dict[str, pd.DataFrame]:
@@ -94,7 +94,7 @@ def rank_curve(ranks: pd.DataFrame) -> pd.DataFrame:
             counts = resamples(seeds, [*opening.values(), str(size)])
             rank = subsets["rank"].to_numpy(dtype=float)
             quantiles = _quantiles(rank[:, None], [0.5, 0.10, 0.25, 0.75, 0.90])[:, 0]
-            limits = _quantiles(_medians(rank, counts)[:, None], _TAILS)[:, 0]
+            limits = _quantiles(_medians(rank, counts)[:, None], TAILS)[:, 0]
             row = {**opening, "demonstrations": size}
             row |= dict(zip(("median", "q10", "q25", "q75", "q90"), quantiles, strict=True))
             row |= dict(zip(("median_low", "median_high"), limits, strict=True))
@@ -173,7 +173,7 @@ def _mean_and_limits(values: Floats, counts: Ints) -> tuple[Floats, Floats, Floa
     there = ~np.isnan(values)
     with np.errstate(invalid="ignore"):  # a resample may have nothing of a column
         means = weights @ np.where(there, values, 0.0) / (weights @ there.astype(float))
-    low, high = _quantiles(means[1:], _TAILS)
+    low, high = _quantiles(means[1:], TAILS)
     return means[0], low, high
 
 

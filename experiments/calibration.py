@@ -19,7 +19,6 @@ import numpy as np
 import pandas as pd
 
 from experiments.settings import Settings
-from experiments.stages import task_box
 from mlci.inference import confidence, printed_confidence, rank_constraints
 from mlci.maxent import expected_violations, log_partition, sample_moves
 from mlci.mdp import TabularMDP, forbid
@@ -76,7 +75,10 @@ def calibration_table(
         Shown(*(part[first : first + longest] for part in vars(shown).values()))
         for first in range(0, len(shown.phi) - longest + 1, longest)
     ]
-    drawn = [_drawn_set(settings, mdp, hypotheses, number) for number in range(wanted.sets)]
+    constrained = forbid(mdp, np.arange(hypotheses, mdp.crosses.shape[1]))
+    drawn = [
+        _drawn_set(settings, mdp, constrained, hypotheses, number) for number in range(wanted.sets)
+    ]
     rows = []
     for source, sets in (("demonstrator", own), ("model", drawn)):
         for number, of_set in enumerate(sets):
@@ -126,14 +128,16 @@ def _binned(probability: Floats, right: Bools) -> Iterator[dict[str, float]]:
         }
 
 
-def _drawn_set(settings: Settings, mdp: TabularMDP, hypotheses: int, number: int) -> Shown:
+def _drawn_set(
+    settings: Settings, mdp: TabularMDP, constrained: TabularMDP, hypotheses: int, number: int
+) -> Shown:
     """Demonstrations from the tabular model under the truth, up to the first that there is not."""
-    steps, grid, box = step_count(settings.horizon, settings.dt), settings.cells, task_box(settings)
+    steps, grid = step_count(settings.horizon, settings.dt), settings.cells
+    box = settings.tasks.start_box(grid.space)
     world = 0 if settings.truth.cell is None else settings.truth.cell + 1
     rng = np.random.default_rng(
         np.random.SeedSequence(settings.seed, spawn_key=(_STREAM, world, number))
     )
-    constrained = forbid(mdp, np.arange(hypotheses, mdp.crosses.shape[1]))
     phi, violated = [], []
     for _ in range(max(settings.calibration.demonstrations)):
         for _ in range(_DRAWS):

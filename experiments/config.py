@@ -9,9 +9,10 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
 from itertools import chain
-from typing import Any
+from typing import Any, TypeVar
 
 from experiments.checks import (
     advice_number_problems,
@@ -31,10 +32,13 @@ from experiments.settings import (
     RecordedSettings,
     Settings,
     StudySettings,
+    SubjectSettings,
     SystemSettings,
     system_class,
 )
 from mlci.soundness import check_system
+
+_Subject = TypeVar("_Subject", bound=SubjectSettings)
 
 
 class ConfigError(Exception):
@@ -77,17 +81,14 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
     Raises:
         ConfigError: listing every problem found.
     """
-    problems = Problems()
-    # A system's config also says how to make demonstrations of it, which is not needed here.
-    known = {key: tree[key] for key in tree if key not in ("tasks", "safety", "truth")}
-    settings = parse(RecordedSettings, known, "", problems, {SystemSettings: _parse_system})
-    for check in (
-        lambda: number_problems(settings),
-        lambda: chain(shape_problems(settings), task_problems(settings)),
-        lambda: size_problems(settings),
-    ):
-        _check(problems, check)
-    return settings
+    return _read_subject(
+        RecordedSettings,
+        tree,
+        ("tasks", "safety", "truth"),  # how demonstrations are made
+        number_problems,
+        lambda settings: chain(shape_problems(settings), task_problems(settings)),
+        size_problems,
+    )
 
 
 def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
@@ -96,15 +97,30 @@ def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
     Raises:
         ConfigError: listing every problem found.
     """
+    return _read_subject(
+        AdviceSettings,
+        tree,
+        ("safety", "transition", "truth"),  # how demonstrations are made, and what is compared
+        advice_number_problems,
+        advice_problems,
+    )
+
+
+def _read_subject(
+    kind: type[_Subject],
+    tree: Mapping[str, Any],
+    unused: Collection[str],
+    *checks: Callable[[_Subject], Iterable[str]],
+) -> _Subject:
+    """Settings without those keys of a system's config that they have no use for.
+
+    Each check relies on the one before.
+    """
     problems = Problems()
-    # A system's config also says how to make demonstrations, and what is compared here.
-    known = {key: tree[key] for key in tree if key not in ("safety", "transition", "truth")}
-    settings = parse(AdviceSettings, known, "", problems, {SystemSettings: _parse_system})
-    for check in (
-        lambda: advice_number_problems(settings),
-        lambda: advice_problems(settings),
-    ):
-        _check(problems, check)
+    known = {key: tree[key] for key in tree if key not in unused}
+    settings = parse(kind, known, "", problems, {SystemSettings: _parse_system})
+    for check in checks:
+        _check(problems, partial(check, settings))
     return settings
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from experiments.aggregate import resamples
+from experiments.aggregate import TAILS, resamples
 from experiments.calibration import EDGES
 from experiments.settings import NO_TRUTH
 from mlci.spaces import Floats, Ints
 
-_TAILS = (0.025, 0.975)  # of a 95 % interval
 _OF_ROWS = ("source", "demonstrations", "belief")
 
 
@@ -49,7 +48,7 @@ def reliability(calibration: pd.DataFrame) -> pd.DataFrame:
             drawn = counts[:, sets[inside]].astype(float)
             with np.errstate(invalid="ignore"):  # a resample may have nothing in a bin
                 shares = (drawn @ hits) / (drawn @ beliefs)
-            low, high = np.nanquantile(shares, _TAILS)
+            low, high = np.nanquantile(shares, TAILS)
             edges = (-np.inf, *EDGES, np.inf)
             rows.append(
                 {

@@ -50,6 +50,14 @@ class TaskSettings(Region):
     goal: tuple[float | None, ...] | None
     crossing: bool
 
+    def start_box(self, space: StateSpace) -> Box:
+        """Where starts and goals are drawn; a free dimension spans the state space."""
+        box, bounds = self.box(), space.bounds
+        return Box(
+            np.where(np.isfinite(box.lower), box.lower, bounds.lower),
+            np.where(np.isfinite(box.upper), box.upper, bounds.upper),
+        )
+
     @property
     def goal_offsets(self) -> Box | None:
         """The goal region relative to its middle; None for a point."""

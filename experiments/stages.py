@@ -155,7 +155,7 @@ def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Tr
         sample_trials,
         system,
         omega,
-        task_box(settings),
+        settings.tasks.start_box(system.space),
         trials=chosen.pairs,
         seed=settings.seed,
         horizon=settings.horizon,
@@ -242,15 +242,6 @@ def _corners(regions: ConstraintSet) -> list[list[str]]:
     """The corners of regions, for a key: infinite sides are no JSON."""
     sides = np.hstack([regions.lower, regions.upper])
     return [[repr(float(side)) for side in box] for box in sides]
-
-
-def task_box(settings: Settings) -> Box:
-    """Where starts and goals are drawn; a free dimension spans the state space."""
-    box, bounds = settings.tasks.box(), settings.model.space.bounds
-    return Box(
-        np.where(np.isfinite(box.lower), box.lower, bounds.lower),
-        np.where(np.isfinite(box.upper), box.upper, bounds.upper),
-    )
 
 
 def _system_module(settings: Settings) -> ModuleType:

@@ -85,8 +85,7 @@ def facts(reliability: pd.DataFrame) -> str:
         "Mean probability and share that is right, over all beliefs of a kind:",
     ]
     for (source, belief, number), rows in table.groupby(["source", "belief", "demonstrations"]):
-        inside = rows[np.isfinite(rows["lower"]) & np.isfinite(rows["upper"])]
-        beyond = rows[~rows.index.isin(inside.index)]
+        inside, beyond = rows[_proper(rows)], rows[~_proper(rows)]
         text = f"  {source}, {belief}, {number}: "
         if len(inside):
             probability, right = (
@@ -113,8 +112,12 @@ def _checked(reliability: pd.DataFrame) -> pd.DataFrame:
 
 def _drawn(panel: pd.DataFrame) -> pd.Series:
     """Which rows are probabilities, and of enough beliefs."""
-    finite = np.isfinite(panel["lower"]) & np.isfinite(panel["upper"])
-    return finite & (panel["count"] >= FEW)
+    return _proper(panel) & (panel["count"] >= FEW)
+
+
+def _proper(rows: pd.DataFrame) -> pd.Series:
+    """Which rows are probabilities."""
+    return np.isfinite(rows["lower"]) & np.isfinite(rows["upper"])
 
 
 def _draw_frame(axes: Axes, panel: pd.DataFrame, belief: str) -> None:
@@ -129,7 +132,7 @@ def _draw_frame(axes: Axes, panel: pd.DataFrame, belief: str) -> None:
     axes.set_ylim(0, 104)
     axes.set_xticks(ticks, labels=[str(tick) for tick in ticks])
     axes.set_yticks(ticks, labels=[str(tick) for tick in ticks])
-    beyond = panel[~(np.isfinite(panel["lower"]) & np.isfinite(panel["upper"]))]
+    beyond = panel[~_proper(panel)]
     if len(beyond):
         share = beyond["weight"].sum() / panel["weight"].sum()
         right = np.average(beyond["observed"], weights=beyond["weight"])

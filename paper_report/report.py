@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from paper_report import (
@@ -90,12 +90,10 @@ space, violation distances are numbers of regions, ranks start at 1, and dt is i
 
 def report(results: Results) -> str:
     """The report of a folder of results."""
-    parts = []
-    for number, (write, figures) in enumerate(CLAIMS, start=1):
-        try:
-            claim = write(results)
-        except Missing as missing:
-            parts.append(f"## Claim {number}\n\n{absent(missing)}")
+    parts, claims = [], _claims(results)
+    for number, (claim, (_, figures)) in enumerate(zip(claims, CLAIMS, strict=True), start=1):
+        if isinstance(claim, Missing):
+            parts.append(f"## Claim {number}\n\n{absent(claim)}")
         else:
             text = f"{claim.markdown()}\n{_figures(results, figures)}"
             parts.append(f"## Claim {number}: {claim.title}\n\n{text}")
@@ -105,18 +103,32 @@ def report(results: Results) -> str:
         except Missing as missing:
             text = absent(missing)
         parts.append(f"## {heading}\n\n{text}")
-    lines = [_INTRODUCTION, "## Verdicts\n", verdicts(results), RULES, *parts]
+    lines = [_INTRODUCTION, "## Verdicts\n", _verdicts(claims), RULES, *parts]
     return "\n".join(line.rstrip("\n") + "\n" for line in lines)
 
 
 def verdicts(results: Results) -> str:
     """All claims with their verdicts, as a table."""
-    rows: list[list[object]] = []
-    for number, (write, _) in enumerate(CLAIMS, start=1):
+    return _verdicts(_claims(results))
+
+
+def _claims(results: Results) -> list[Claim | Missing]:
+    """Each claim, or what is missing for it."""
+    found: list[Claim | Missing] = []
+    for write, _ in CLAIMS:
         try:
-            claim = write(results)
+            found.append(write(results))
         except Missing as missing:
-            rows.append([number, "-", "not there yet", missing])
+            found.append(missing)
+    return found
+
+
+def _verdicts(claims: Sequence[Claim | Missing]) -> str:
+    """The table of some claims."""
+    rows: list[list[object]] = []
+    for number, claim in enumerate(claims, start=1):
+        if isinstance(claim, Missing):
+            rows.append([number, "-", "not there yet", claim])
             continue
         held = [f"{part.statement}: {part.holding} of {len(part.checks)}" for part in claim.parts]
         rows.append([number, claim.title, f"**{claim.verdict}**", "; ".join(held)])

@@ -27,11 +27,12 @@ def section(results: Results) -> str:
     cases = results.table(STUDY, "cases", ("truth", "cells", "dt", "case"))
     keys = [name for name in cases if name not in ("case", "choice", "value")]
     means = results.table(STUDY, "measures", (*keys, "measure", "mean", "low", "high"))
+    means = means[means["measure"].isin(SHOWN)]
     ranks = cases.merge(after(results, STUDY), on=keys, validate="one_to_one")
     usual = ranks[ranks["case"] == DEFAULT]
     if usual.empty:
         raise Missing(STUDY, f"the study `{STUDY}` has no case {DEFAULT!r}")
-    texts = means[means["measure"].isin(SHOWN)].assign(text=[_text(row) for row in _rows(means)])
+    texts = means.assign(text=[_text(row) for row in means.to_dict("records")])
     wide = texts.pivot(index=keys, columns="measure", values="text").reset_index()
     ranks = ranks.merge(wide, on=keys, how="left", validate="one_to_one")
     names = list(dict.fromkeys(ranks["case"]))
@@ -74,11 +75,6 @@ def kept(results: Results) -> str:
 def _usual_grid(ranks: pd.DataFrame) -> pd.Series:
     """Whether a row is of the default discretisation."""
     return ranks["cells"].between(CELLS, 1.1 * CELLS) & (ranks["dt"] == DT)
-
-
-def _rows(means: pd.DataFrame) -> list[dict]:
-    """The rows that are shown."""
-    return means[means["measure"].isin(SHOWN)].to_dict("records")
 
 
 def _text(row: dict) -> str:

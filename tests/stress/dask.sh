@@ -23,7 +23,8 @@ trap stop EXIT
 
 # --- the cluster: a job whose worker dies is lost at once, which is hardest to resume
 address=tcp://127.0.0.1:18786
-export DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES=0 HOLD=$work/hold PYTHONPATH=$work
+export DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES=0
+. tests/stress/held_sweep.bash
 "$PYTHON" -m distributed.cli.dask_scheduler --host 127.0.0.1 --port 18786 --no-dashboard \
     > "$work/scheduler.log" 2>&1 &
 pids+=($!)
@@ -35,27 +36,6 @@ worker() {
 worker 1
 worker 2
 
-# --- a sweep of 8 points, each of which waits as long as the file $HOLD exists
-cat > "$work/held.py" << 'END'
-import os, time
-from dataclasses import dataclass
-from mlci.systems import DoubleIntegrator
-
-
-@dataclass(frozen=True, eq=False)
-class Held(DoubleIntegrator):
-    def dynamics(self, states, controls):
-        # A config is tried with few states before any work.
-        while len(states) > 10 and os.path.exists(os.environ["HOLD"]):
-            time.sleep(0.1)
-        return super().dynamics(states, controls)
-END
-sweep() { # FOLDER MORE...: the sweep into a folder
-    "$PYTHON" experiments/run.py -m scale=smoke truth=wall system._target_=held.Held \
-        grid.shape=[8,8] safety.shape=[21,21] demonstrations.pairs=4 demonstrations.keep=2 \
-        'truth.boxes=[{lower:[-0.6,null],upper:[0.6,null]}]' hypotheses.shape=[5,null] \
-        dt=0.25,0.5 actions=3,5 seed=0,1 study=s results="$@"
-}
 attempts() { find "$work/results/points" -name attempt.json 2> /dev/null | wc -l; }
 
 sweep "$work/local" > "$work/local.log"
