@@ -12,6 +12,7 @@ h       System.dynamics       time derivative of the state, (..., n)     unit of
 S       grid.size             number of grid cells (tabular states)      --
 A       len(actions)          number of actions                          --
 M       mdp.moves             moves of a cell: action x start point      --
+W       --                    ways of all cells: moves alike, merged     --
 T       steps                 transitions of a tabular trajectory        --
 K       --                    samples of a recorded path, less one       --
 C       len(constraints)      number of regions (hypotheses)             --
@@ -44,6 +45,7 @@ __all__ = [
     "simulate",
     "spaces",
     "systems",
+    "ways",
 ]
 
 __version__ = "0.1.0"

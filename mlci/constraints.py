@@ -108,6 +108,25 @@ class ConstraintSet:
             covered |= np.all(fits | all_round, axis=1)
         return covered
 
+    def overlaps(self, other: ConstraintSet) -> Bools:
+        """(C,) which regions share more than an edge with some region of `other`.
+
+        What is shared must be wider than 1e-9 of the bounds in each dimension.
+        """
+        widths, periodic = self.space.bounds.widths, self.space.periodic
+        slack = 1e-9 * widths
+        mine, theirs = self._within_bounds(), other._within_bounds()
+        shared = np.zeros(len(self), dtype=bool)
+        for lower, upper in zip(*theirs, strict=True):
+            # Two intervals overlap where one of them begins inside the other.
+            ahead, behind = lower - mine[0], mine[0] - lower
+            ahead -= np.where(periodic, np.floor((ahead + slack) / widths) * widths, 0.0)
+            behind -= np.where(periodic, np.floor((behind + slack) / widths) * widths, 0.0)
+            begins_in_mine = (ahead > -slack) & (ahead < mine[1] - mine[0] - slack)
+            begins_in_theirs = (behind > -slack) & (behind < upper - lower - slack)
+            shared |= np.all(begins_in_mine | begins_in_theirs, axis=1)
+        return shared
+
     def _within_bounds(self) -> tuple[Floats, Floats]:
         """Finite corners (C, n): cut to the bounds, and to one period where a region goes round."""
         bounds, periodic = self.space.bounds, self.space.periodic

@@ -26,9 +26,9 @@ def reachable(mdp: TabularMDP, start: int, steps: int) -> list[Ints]:
     """Cells that can be occupied after t = 0 .. steps allowed moves from a start cell."""
     cells = [np.array([start], dtype=np.int64)]
     for _ in range(steps):
-        here = cells[-1]
+        way, _ = _ways_of(mdp, cells[-1])
         mark = np.zeros(mdp.states, dtype=bool)
-        mark[mdp.successor[here][mdp.allowed[here]]] = True
+        mark[mdp.ways.successor[way[mdp.ways.log_weight[way] > -np.inf]]] = True
         cells.append(np.flatnonzero(mark))
     return cells
 
@@ -55,12 +55,14 @@ def log_partition(mdp: TabularMDP, start: int, goals: ArrayLike, steps: int) -> 
     ends = np.intersect1d(cells[steps], np.atleast_1d(goals))
     log_z[steps, ends] = 0.0
     for t in reversed(range(steps)):
-        for here in _parts(cells[t]):
-            value = _action_values(mdp, log_z[t + 1], here)
-            best = np.max(value, axis=1)
+        for here in _parts(mdp, cells[t]):
+            way, ends = _ways_of(mdp, here)
+            value = mdp.ways.log_weight[way] + log_z[t + 1, mdp.ways.successor[way]]
+            best = np.maximum.reduceat(value, ends[:-1])
             finite = best > -np.inf
-            spread = np.sum(np.exp(value[finite] - best[finite, None]), axis=1)
-            log_z[t, here[finite]] = best[finite] + np.log(spread)
+            shift = np.repeat(np.where(finite, best, 0.0), np.diff(ends))
+            spread = np.add.reduceat(np.exp(value - shift), ends[:-1])
+            log_z[t, here[finite]] = best[finite] + np.log(spread[finite])
     return log_z
 
 
@@ -79,9 +81,9 @@ def violation_probabilities(mdp: TabularMDP, log_z: Floats, start: int) -> Float
     """Phi_(i,T) (C,): the probability that a trajectory from `start` crosses region i.
 
     phi_t^i(s) = sum over moves of pi_t(move | s) [1 if the move crosses i, else phi_(t+1)^i(s')],
-    backwards from phi_T = 0: sums of products of probabilities, so nothing cancels. Moves with
-    one successor are merged, and only the pairs of a cell and a region with a crossing move are
-    then computed move by move.
+    backwards from phi_T = 0. Computed as sum of pi_t phi_(t+1)^i(s') over all moves, those with
+    one successor merged, and then pi_t (1 - phi_(t+1)^i(s')) added for each move that crosses i:
+    all terms are at least 0, so nothing cancels.
 
     Raises:
         ValueError: no trajectory from `start` reaches a goal, so there is no distribution.
@@ -100,8 +102,7 @@ def violation_probabilities(mdp: TabularMDP, log_z: Floats, start: int) -> Float
 
 def _block_of_phi(mdp: TabularMDP, log_z: Floats, first: int, last: int) -> Floats:
     """Phi of the regions from `first` to before `last`, of the one cell that log_z starts in."""
-    begins, pair_region, pair_crossed = mdp.crossing_pairs
-    steps = len(log_z) - 1
+    ways, steps = mdp.ways, len(log_z) - 1
     row_of = np.zeros(mdp.states, dtype=np.int64)
     cells_after = np.flatnonzero(log_z[steps] > -np.inf)
     phi = np.zeros((len(cells_after), last - first))
@@ -111,25 +112,46 @@ def _block_of_phi(mdp: TabularMDP, log_z: Floats, first: int, last: int) -> Floa
         cells = np.flatnonzero(log_z[t] > -np.inf)
         phi_after, phi = phi, np.empty((len(cells), last - first))
         row = 0
-        for here in _parts(cells):
-            chances = _chances(mdp, log_z, t, here)
-            now = _merged(mdp, here, chances, row_of, len(cells_after)) @ phi_after
-            counts = begins[here + 1] - begins[here]
-            owner = np.repeat(np.arange(len(here)), counts)
-            begin = begins[here] - np.cumsum(counts) + counts
-            pair = np.arange(len(owner)) + np.repeat(begin, counts)
-            region = pair_region[pair] - first
-            wanted = (region >= 0) & (region < last - first)
-            owner, pair, region = owner[wanted], pair[wanted], region[wanted]
-            if len(pair):
-                # A successor outside the support has probability 0: whichever row stands for it.
-                after = phi_after[row_of[mdp.successor[here[owner]]], region[:, None]]
-                entered = np.where(pair_crossed[pair], 1.0, after)
-                now[owner, region] = np.einsum("pm,pm->p", chances[owner], entered)
+        for here in _parts(mdp, cells):
+            way, ends = _ways_of(mdp, here)
+            column = row_of[ways.successor[way]]
+            value = ways.log_weight[way] + log_z[t + 1, ways.successor[way]]
+            chance = np.exp(value - np.repeat(log_z[t, here], np.diff(ends)))
+            chance /= np.repeat(np.add.reduceat(chance, ends[:-1]), np.diff(ends))
+            # A successor outside the support has probability 0: whichever row stands for it.
+            column = np.maximum(column, 0)
+            moved = sparse.csr_matrix((chance, column, ends), shape=(len(here), len(cells_after)))
+            now = moved @ phi_after
+            owner, entry, region = _of_cells(
+                ways.crossing_begins, ways.crossing_region, here, first, last
+            )
+            place = ways.crossing_way[entry] - ways.begins[here[owner]] + ends[owner]
+            lacking = chance[place] * (1.0 - phi_after[column[place], region])
+            np.add.at(now.reshape(-1), owner * (last - first) + region, lacking)
+            owner, _, region = _of_cells(
+                ways.certain_begins, ways.certain_region, here, first, last
+            )
+            now[owner, region] = 1.0
             phi[row : row + len(here)] = now
             row += len(here)
         cells_after = cells
     return phi[0]
+
+
+def _of_cells(
+    begins: Ints, regions: Ints, cells: Ints, first: int, last: int
+) -> tuple[Ints, Ints, Ints]:
+    """Entries of some cells whose regions are from `first` to before `last`.
+
+    Returns the place in `cells` that each belongs to, its own number, and its region less `first`.
+    """
+    entry, ends = _ranges(begins, cells)
+    owner = np.repeat(np.arange(len(cells)), np.diff(ends))
+    region = regions[entry] - first
+    wanted = (region >= 0) & (region < last - first)
+    if wanted.all():
+        return owner, entry, region
+    return owner[wanted], entry[wanted], region[wanted]
 
 
 def expected_violations(
@@ -179,8 +201,8 @@ def sample_moves(
     cells = [np.full(count, start, dtype=np.int64)]
     moves = []
     for t in range(len(log_z) - 1):
-        support, chances = policy(mdp, log_z, t)
-        cumulative = np.cumsum(chances[np.searchsorted(support, cells[-1])], axis=1)
+        here, place = np.unique(cells[-1], return_inverse=True)
+        cumulative = np.cumsum(_chances(mdp, log_z, t, here)[place], axis=1)
         # Scaled by the last entry, so that rounding cannot lift a draw past every move.
         draws = rng.random(count)[:, None] * cumulative[:, -1:]
         moves.append(np.argmax(cumulative > draws, axis=1))
@@ -188,10 +210,23 @@ def sample_moves(
     return np.stack(cells, axis=1), np.stack(moves, axis=1)
 
 
-def _parts(cells: Ints) -> Iterator[Ints]:
-    """Cells in parts whose moves fit into memory and cache."""
-    for first in range(0, len(cells), _CELLS_AT_ONCE):
-        yield cells[first : first + _CELLS_AT_ONCE]
+def _parts(mdp: TabularMDP, cells: Ints) -> Iterator[Ints]:
+    """Cells that some way leaves, in parts whose ways fit into memory and cache."""
+    left = cells[mdp.ways.begins[cells + 1] > mdp.ways.begins[cells]]
+    for first in range(0, len(left), _CELLS_AT_ONCE):
+        yield left[first : first + _CELLS_AT_ONCE]
+
+
+def _ways_of(mdp: TabularMDP, cells: Ints) -> tuple[Ints, Ints]:
+    """The ways of some cells, one cell after the other, and (Q+1,) where those of each begin."""
+    return _ranges(mdp.ways.begins, cells)
+
+
+def _ranges(begins: Ints, cells: Ints) -> tuple[Ints, Ints]:
+    """The numbers from begins[s] to before begins[s+1] of some cells s, and where each begin."""
+    counts = begins[cells + 1] - begins[cells]
+    ends = np.append(0, np.cumsum(counts))
+    return np.arange(ends[-1]) + np.repeat(begins[cells] - ends[:-1], counts), ends
 
 
 def _chances(mdp: TabularMDP, log_z: Floats, t: int, cells: Ints) -> Floats:
@@ -204,19 +239,3 @@ def _action_values(mdp: TabularMDP, log_z_after: Floats, cells: Ints) -> Floats:
     """(Q, M) reward + log_z[t+1, s'] of the moves of `cells`, -inf where not allowed."""
     value = mdp.reward[cells] + log_z_after[mdp.successor[cells]]
     return np.where(mdp.allowed[cells], value, -np.inf)
-
-
-def _merged(
-    mdp: TabularMDP, cells: Ints, chances: Floats, row_of: Ints, rows_after: int
-) -> sparse.csr_matrix:
-    """(Q, rows_after) transition probabilities, the moves to one successor added up."""
-    order, successor, begins = mdp.by_successor
-    order, successor, begins = order[cells], successor[cells], begins[cells]
-    first = np.flatnonzero(begins)
-    weight = np.add.reduceat(np.take_along_axis(chances, order, axis=1).ravel(), first)
-    column = row_of[successor.ravel()[first]]
-    ends = np.append(0, np.cumsum(np.sum(begins, axis=1)))
-    return sparse.csr_matrix(
-        (np.where(column >= 0, weight, 0.0), np.maximum(column, 0), ends),
-        shape=(len(cells), rows_after),
-    )

@@ -31,6 +31,7 @@ from mlci.grids import Grid
 from mlci.simulate import rollout
 from mlci.spaces import Bools, Floats, Ints
 from mlci.systems import System
+from mlci.ways import Ways, merge_moves
 
 _CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the curve it stands for
 _MOVES_AT_ONCE = 1 << 17  # what a step of long work holds beside its result: about 100 MB
@@ -86,47 +87,9 @@ class TabularMDP:
         return int(self.successor.shape[1])
 
     @cached_property
-    def by_successor(self) -> tuple[Ints, Ints, Bools]:
-        """Each cell's moves sorted by successor, so that those with the same one can be merged.
-
-        Returns (S, M) each: the moves in that order, their successors, and where a new
-        successor begins; in the smallest whole numbers that hold them.
-        """
-        shape = self.successor.shape
-        order = np.empty(shape, dtype=np.min_scalar_type(self.moves))
-        successor = np.empty(shape, dtype=np.int32 if self.states < 1 << 31 else np.int64)
-        begins = np.ones(shape, dtype=bool)
-        for block in self.blocks():
-            order[block] = np.argsort(self.successor[block], axis=1, kind="stable")
-            ordered = np.take_along_axis(self.successor[block], order[block], axis=1)
-            begins[block, 1:] = ordered[:, 1:] != ordered[:, :-1]
-            successor[block] = np.maximum(ordered, 0)
-        return order, successor, begins
-
-    @cached_property
-    def crossing_pairs(self) -> tuple[Ints, Ints, Bools]:
-        """The P pairs of a cell and a region that at least one of the cell's moves crosses.
-
-        Returns, with the pairs in order of cell and then region: (S+1,) where each cell's pairs
-        begin, so that those of cell s are begins[s] to begins[s+1]; the pairs' regions (P,); and
-        which moves cross (P, M).
-        """
-        regions, ends = self.crosses.shape[1], self.crosses.indptr
-        begins, region, crossed = np.zeros(self.states + 1, dtype=np.int64), [], []
-        for block in self.blocks():
-            first, last = block.start * self.moves, block.stop * self.moves
-            entries = np.diff(ends[first : last + 1])
-            row = np.repeat(np.arange(last - first), entries)
-            state, move = np.divmod(row, self.moves)
-            column = self.crosses.indices[ends[first] : ends[last]]
-            pair, which = np.unique(state * regions + column, return_inverse=True)
-            part = np.zeros((len(pair), self.moves), dtype=bool)
-            part[which, move] = True
-            count = np.bincount(pair // regions, minlength=block.stop - block.start)
-            begins[block.start + 1 : block.stop + 1] = count
-            region.append((pair % regions).astype(np.int32))
-            crossed.append(part)
-        return np.cumsum(begins), np.concatenate(region), np.concatenate(crossed)
+    def ways(self) -> Ways:
+        """The moves of each cell, those that nothing tells apart taken together."""
+        return merge_moves(self.successor, self.reward, self.allowed, self.crosses, self.blocks())
 
     def blocks(self) -> Iterator[slice]:
         """Consecutive slices of the cells, of so many moves as one step of work should hold."""
@@ -223,10 +186,8 @@ def forbid(mdp: TabularMDP, regions: ArrayLike) -> TabularMDP:
     columns = np.atleast_1d(np.asarray(regions, dtype=np.int64))
     crossed = np.asarray(mdp.crosses[:, columns].sum(axis=1)).reshape(mdp.successor.shape) > 0
     forbidden = replace(mdp, allowed=mdp.allowed & ~crossed)
-    # Neither depends on which moves are allowed, so what has been computed is kept.
-    for name in ("by_successor", "crossing_pairs"):
-        if name in vars(mdp):
-            vars(forbidden)[name] = getattr(mdp, name)
+    if "ways" in vars(mdp):  # what takes the time has been done
+        vars(forbidden)["ways"] = mdp.ways.without(crossed)
     return forbidden
 
 

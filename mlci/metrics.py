@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import comb
 
 from mlci.grids import Grid
 from mlci.inference import log_likelihood_gain, rank_scores
@@ -95,9 +96,39 @@ def truth_ranks(phi: ArrayLike, violated: ArrayLike, truth: Bools, subsets: Ints
     """
     if not np.any(truth):
         return np.full(len(subsets), np.nan)
+    gain = _subset_gains(phi, violated, subsets)
+    return np.asarray(np.min(rank_scores(gain, gain > -np.inf)[:, truth], axis=1))
+
+
+def top_chances(
+    phi: ArrayLike, violated: ArrayLike, good: Bools, subsets: Ints, top: int
+) -> Floats:
+    """Whether the `top` best hypotheses of each subset are all good, the measure of Fig. 7.
+
+    Args:
+        phi: (N, C) as for `truth_ranks`.
+        violated: (N, C) what the demonstrations violate.
+        good: (C,) which hypotheses count, such as those that overlap the truth.
+        subsets: (B, k) indices of demonstrations.
+        top: how many of the best there must be.
+
+    Returns:
+        (B,) 1 or 0; between them where the last places are tied: the chance that all are good if
+        the tie is broken at random.
+    """
+    loss = -_subset_gains(phi, violated, subsets)
+    last = np.sort(loss, axis=1)[:, [top - 1]]
+    before, tied = loss < last, loss == last
+    places = top - np.sum(before, axis=1)
+    fitting, all_ways = (comb(np.sum(part, axis=1), places) for part in (tied & good, tied))
+    return np.asarray(np.all(good | ~before, axis=1) * fitting / all_ways)
+
+
+def _subset_gains(phi: ArrayLike, violated: ArrayLike, subsets: Ints) -> Floats:
+    """(B, C) L_i after the demonstrations of each subset; -inf of what one of them violates."""
     gain = np.sum(log_likelihood_gain(phi)[subsets], axis=1)
-    feasible = ~np.any(np.asarray(violated, dtype=bool)[subsets], axis=1)
-    return np.asarray(np.min(rank_scores(gain, feasible)[:, truth], axis=1))
+    refuted = np.any(np.asarray(violated, dtype=bool)[subsets], axis=1)
+    return np.where(refuted, -np.inf, gain)
 
 
 @dataclass(frozen=True)

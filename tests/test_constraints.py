@@ -212,6 +212,75 @@ def test_inside_agrees_with_sampled_points():
     assert 10 < sum(expected) < 200
 
 
+def test_overlaps_agrees_with_sampled_points():
+    truth = regions(
+        CYLINDER, ((5.0, 7.6), (-3.0, 0.0)), (FREE, (4.0, 9.0)), ((1.0, 2.0), (0.0, 1.0))
+    )
+    hypotheses = ConstraintSet.from_grid(CYLINDER, (20, 24)).joined(
+        regions(
+            CYLINDER,
+            ((1.2, 1.8), (0.2, 0.8)),
+            ((0.5, 2.5), (-0.5, 1.5)),  # holds one of the truth
+            ((0.5, 2.5), (0.2, 0.8)),  # lies across one, without a corner in it
+            ((2.0, 3.0), (0.0, 1.0)),  # shares an edge only
+            ((2.0, 3.0), (1.0, 2.0)),  # shares a corner only
+            ((3.0, 11.0), (-2.0, -1.0)),  # wider than the period
+            ((1.5, 4.9), (-2.0, -1.0)),  # in the gap that the truth leaves
+            ((1.0, 5.5), (-2.0, -1.0)),  # meets both ends of the truth
+            ((-1.0, 0.5), (-2.5, -0.5)),  # given a turn away
+            ((3.0, 4.0), FREE),
+            (FREE, (0.5, 3.0)),  # all round
+            (FREE, (2.0, 3.0)),  # all round, where the truth is not
+            (FREE, (-9.0, -5.0)),  # sticks out of the state space
+            (FREE, (6.0, 9.0)),  # shares with the truth what is beyond the state space
+        )
+    )
+    share = np.random.default_rng(5).uniform(0.001, 0.999, size=(400, 2))
+
+    def points(one: ConstraintSet, index: int) -> np.ndarray:
+        box = one.box(index)
+        free = np.isinf(box.lower)
+        lower, upper = np.where(free, [[0.0, -6.0], [TURN, 6.0]], [box.lower, box.upper])
+        drawn = lower + share * (upper - lower)
+        return drawn[np.abs(drawn[:, 1]) < 6.0]
+
+    def expected(one: ConstraintSet, other: ConstraintSet) -> list[bool]:
+        drawn = np.concatenate([points(other, j) for j in range(len(other))])
+        in_other = [meets(other, points(one, i)).any() for i in range(len(one))]
+        return (np.array(in_other) | meets(one, drawn).any(axis=0)).tolist()
+
+    for one, other in ((hypotheses, truth), (truth, hypotheses)):
+        assert one.overlaps(other).tolist() == expected(one, other)
+    listed = hypotheses.overlaps(truth)[480:].astype(int).tolist()
+    assert listed == [1, 1, 1, 0, 0, 1, 0, 1, 1, 1, 1, 0, 0, 0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_overlaps_is_to_share_a_cell_of_a_lattice(seed):
+    """Sides on a lattice of 12 x 24 cells: many share an edge, some are given turns away."""
+    rng = np.random.default_rng(seed)
+    step = CYLINDER.bounds.widths / [12, 24]
+    centres = np.stack(np.meshgrid(np.arange(12), np.arange(24)), axis=-1).reshape(-1, 2) + 0.5
+    centres = centres * step - [0.0, 6.0]
+
+    def drawn() -> ConstraintSet:
+        lower = rng.integers([-12, -2], [18, 24], size=(60, 2))
+        upper = lower + rng.integers([1, 3], [16, 9], size=(60, 2))
+        lower, upper = (corner * step - [0.0, 6.0] for corner in (lower, upper))
+        free = rng.random((60, 2)) < 0.05
+        return ConstraintSet(
+            CYLINDER, np.where(free, -np.inf, lower), np.where(free, np.inf, upper)
+        )
+
+    one, other = drawn(), drawn()
+    shared = meets(one, centres).T.astype(int) @ meets(other, centres).astype(int) > 0
+    assert 0.1 < shared.mean() < 0.9
+    for j in range(60):
+        alone = ConstraintSet(CYLINDER, other.lower[[j]], other.upper[[j]])
+        np.testing.assert_array_equal(one.overlaps(alone), shared[:, j])
+    np.testing.assert_array_equal(other.overlaps(one), shared.any(axis=0))
+
+
 def test_no_regions_are_entered_by_nothing_and_far_from_everywhere():
     nothing = ConstraintSet.from_boxes(CYLINDER, [])
     some = regions(CYLINDER, ((1.0, 2.0), (0.0, 1.0)))
@@ -222,6 +291,8 @@ def test_no_regions_are_entered_by_nothing_and_far_from_everywhere():
     assert nothing.signed_distance(paths).shape == (4, 9)
     assert some.inside(nothing).tolist() == [False]
     assert nothing.inside(some).shape == (0,)
+    assert some.overlaps(nothing).tolist() == [False]
+    assert nothing.overlaps(some).shape == (0,)
     for both in (nothing.joined(some), some.joined(nothing)):
         np.testing.assert_array_equal(both.violated_by(paths), some.violated_by(paths))
 

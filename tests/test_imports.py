@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 SPACES = {"spaces"}
 SETS = SPACES | {"grids", "constraints"}
 MOTION = SPACES | {"systems", "simulate"}
-TABULAR = SETS | MOTION | {"mdp", "maxent"}
+TABULAR = SETS | MOTION | {"ways", "mdp", "maxent"}
 
 # A module of mlci to the modules of mlci that it may import.
 MAY_IMPORT = {
@@ -30,7 +30,8 @@ MAY_IMPORT = {
     "demonstrator": SETS | MOTION | {"reachability", "ilqr", "demonstrations"},
     "recording_formats": MOTION,
     "recordings": MOTION | {"demonstrations", "recording_formats"},
-    "mdp": SETS | MOTION,
+    "ways": SPACES,
+    "mdp": SETS | MOTION | {"ways"},
     "maxent": TABULAR,
     "inference": TABULAR,
     "online": TABULAR | {"inference"},

@@ -143,46 +143,6 @@ def test_blocks_of_cells_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) ->
     assert len(told) > 10
 
 
-@pytest.mark.parametrize("at_once", [1, 40, 1 << 17])
-def test_what_is_prepared_for_inference_is_what_the_moves_do(
-    monkeypatch: pytest.MonkeyPatch, at_once: int
-) -> None:
-    """Successors to merge and crossings by cell and region, against cell by cell."""
-    system = DoubleIntegrator()
-    grid = Grid(system.space, (6, 5))
-    regions = ConstraintSet.from_grid(system.space, (4, 3))
-    mdp = discretize(system, grid, action_grid(system, 5), 0.8, regions)
-    crosses = mdp.crosses.toarray().reshape(30, 5, 12)
-    monkeypatch.setattr("mlci.mdp._MOVES_AT_ONCE", at_once)
-    order, successor, begins = mdp.by_successor
-    first, region, crossed = mdp.crossing_pairs
-    assert not mdp.allowed.all()
-    assert first[0] == 0
-    assert first[-1] == len(region) == len(crossed)
-    for cell in range(30):
-        reached = np.sort(mdp.successor[cell])
-        np.testing.assert_array_equal(mdp.successor[cell, order[cell]], reached)
-        np.testing.assert_array_equal(successor[cell], np.maximum(reached, 0))
-        np.testing.assert_array_equal(begins[cell], np.append(True, np.diff(reached) > 0))
-        mine = slice(first[cell], first[cell + 1])
-        np.testing.assert_array_equal(region[mine], np.flatnonzero(crosses[cell].any(axis=0)))
-        np.testing.assert_array_equal(crossed[mine], crosses[cell][:, region[mine]].T)
-
-
-def test_constraints_keep_what_is_prepared_for_inference() -> None:
-    """What does not depend on the allowed moves is the same object, and is what it would be."""
-    system = Pendulum()
-    grid, actions = Grid(system.space, (8, 8)), action_grid(system, 3)
-    regions = ConstraintSet.from_grid(system.space, (4, 4))
-    mdp = discretize(system, grid, actions, 0.5, regions)
-    fresh = forbid(mdp, [5, 6])
-    assert "crossing_pairs" not in vars(fresh)
-    expected = fresh.crossing_pairs
-    assert mdp.crossing_pairs is forbid(mdp, [5, 6]).crossing_pairs
-    for kept, again in zip(mdp.crossing_pairs, expected, strict=True):
-        np.testing.assert_array_equal(kept, again)
-
-
 def test_temperature_divides_the_reward() -> None:
     system = Pendulum()
     arguments = (

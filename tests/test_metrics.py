@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from mlci.metrics import (
     diagnose,
     final_state_error,
     random_subsets,
+    top_chances,
     truth_ranks,
     violation_distance,
 )
@@ -73,6 +75,57 @@ def test_truth_ranks_equal_ranking_each_subset_alone() -> None:
         ranks = truth_ranks(phi, violated, truth, subsets)
         alone = [rank_constraints(phi[s], violated[s]).rank[truth].min() for s in subsets]
         np.testing.assert_array_equal(ranks, alone)
+
+
+def test_top_chances_by_hand() -> None:
+    """After the first demonstration two hypotheses tie; the second refutes one of them."""
+    phi, violated = [[0.5, 0.5, 0.2], [0.0, 0.5, 0.5]], [[False] * 3, [True, False, False]]
+    both = np.array([[0], [1]]), np.array([[0, 1]])
+    for good, chances in (
+        ([True, False, False], [0.5, 0.0, 0.0]),
+        ([True, True, False], [1.0, 0.5, 1.0]),
+        ([False, False, True], [0.0, 0.5, 0.0]),
+    ):
+        found = [top_chances(phi, violated, np.array(good), each, 1) for each in both]
+        np.testing.assert_allclose(np.concatenate(found), chances)
+    for good, chances in (
+        ([True, True, False], [1.0, 0.0, 0.0]),
+        ([True, False, True], [0.0, 0.0, 0.0]),
+        ([False, True, True], [0.0, 1.0, 1.0]),
+    ):
+        found = [top_chances(phi, violated, np.array(good), each, 2) for each in both]
+        np.testing.assert_allclose(np.concatenate(found), chances)
+
+
+@pytest.mark.parametrize("top", [1, 2, 3, 5])
+def test_top_chances_average_all_ways_to_break_ties(top: int) -> None:
+    """Gains are 0, whole numbers of log 2 or infinite, and some hypotheses are violated."""
+    rng = np.random.default_rng(2)
+    phi = rng.choice([0.0, 0.5, 1.0], (7, 5), p=[0.5, 0.4, 0.1])
+    violated = rng.random((7, 5)) < 0.1
+    orders = list(itertools.permutations(range(5)))
+
+    def merit(subset: np.ndarray, hypothesis: int) -> tuple[int, Fraction]:
+        chances = [Fraction(chance) for chance in phi[subset, hypothesis]]
+        if violated[subset, hypothesis].any():
+            return -1, Fraction(0)
+        if 1 in chances:
+            return 1, Fraction(0)
+        return 0, Fraction(np.prod([1 / (1 - chance) for chance in chances]))
+
+    seen = []
+    for good in (np.array([True, True, True, False, True]), rng.random(5) < 0.6):
+        for subsets in random_subsets(7, 4, 6, rng):
+            expected = []
+            for subset in subsets:
+                merits = [merit(subset, i) for i in range(5)]
+                ranked = [sorted(order, key=merits.__getitem__, reverse=True) for order in orders]
+                expected.append(np.mean([good[best[:top]].all() for best in ranked]))
+            found = top_chances(phi, violated, good, subsets, top)
+            np.testing.assert_allclose(found, expected, atol=1e-12)
+            seen += expected
+    assert (top == 5) == (max(seen) == 0)
+    assert (top == 5) == (len(set(seen)) == 1)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from mlci.constraints import ConstraintSet
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.inference import rank_constraints
-from mlci.maxent import expected_violations, log_partition, policy, violation_probabilities
+from mlci.maxent import expected_violations, log_partition, violation_probabilities
 from mlci.mdp import TabularMDP, action_grid, discretize, substep_count
 from mlci.online import prepare
 from mlci.reachability import solve
@@ -30,17 +30,21 @@ TRUTH = ConstraintSet(SYSTEM.space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])  # typ
 
 
 def phi_floor(mdp: TabularMDP, log_z: Floats) -> float:
-    """Seconds to read each merged successor's row of Phi and to write each row, once a step."""
+    """Seconds to read the row of Phi of each successor and to write each cell's, once a step."""
     traffic = 0
+    ways = mdp.ways
+    cell = np.repeat(np.arange(mdp.states), np.diff(ways.begins))
+    pairs = np.unique(np.stack([cell, ways.successor]), axis=1)
+    successors = np.bincount(pairs[0], minlength=mdp.states)
     for t in range(len(log_z) - 1):
-        cells, _ = policy(mdp, log_z, t)
-        traffic += int(np.sum(mdp.by_successor[2][cells])) + len(cells)
+        cells = np.flatnonzero(log_z[t] > -np.inf)
+        traffic += int(np.sum(successors[cells])) + len(cells)
     return traffic * mdp.crosses.shape[1] * 8 / copy_rate(1 << 19)
 
 
 def exp_floor(mdp: TabularMDP, log_z: Floats) -> float:
-    """Seconds to take the exponential of each move of each cell that carries probability."""
-    entries = int(np.sum(log_z > -np.inf)) * mdp.moves
+    """Seconds to take the exponential of each way of each cell that carries probability."""
+    entries = int(np.sum((log_z > -np.inf) @ np.diff(mdp.ways.begins)))
     return median_seconds(lambda: np.exp(np.full(entries, -1.0)))
 
 
@@ -76,7 +80,7 @@ def pendulum_rows(cells: int, dt: float, samples: int) -> list[Row]:
             median_seconds(lambda: log_partition(mdp, start, goal, steps)),
             exp_floor(mdp, log_z),
             7,
-            f"log_partition: {what}; floor: one exponential for each active move",
+            f"log_partition: {what}; floor: one exponential for each active way",
         ),
         Row(
             f"violation_probabilities_{label}",
