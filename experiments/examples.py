@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from experiments.measures import box_table
+from experiments.measures import FIRST, box_table
 from mlci.constraints import ConstraintSet
 from mlci.grids import Grid
 from mlci.spaces import Ints
@@ -47,8 +47,10 @@ def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
         `example_paths`, its demonstrations, thinned out; `example_cells`, the cells of that
         trial's sampled trajectory; `example_moves`, the moves from these cells; and its own
         `example_regions` and `example_dimensions`. And of one trial a truth in several grids,
-        `compared_cells`, `compared_violations` and `compared_paths`. A study of many truths has
-        none of these.
+        `compared_cells`, `compared_violations` and `compared_paths`. And of one point a truth and
+        kind of tasks, all of whose settings are those of most points, `first_ranking`,
+        `first_paths` and `first_violations`: its first demonstrations, and what they tell. A study
+        of many truths has none of these.
     """
     tables: dict[str, list[pd.DataFrame]] = {
         **{
@@ -56,6 +58,7 @@ def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
             for name in ("ranking", "paths", "cells", "moves", "regions", "dimensions")
         },
         **{f"compared_{name}": [] for name in ("cells", "violations", "paths")},
+        **{f"first_{name}": [] for name in ("ranking", "paths", "violations")},
     }
     truths = sorted({_truth(point) for point in points})
     if len(truths) > _MOST_TRUTHS:
@@ -72,6 +75,12 @@ def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
             tables["compared_violations"].append(_violations(point, trial))
         path = _of_trial(_read(example, "paths"), trial, "demonstration")
         tables["compared_paths"].append(path.round(_DECIMALS))
+        for crossing in sorted({point.settings.tasks.crossing for point in of_truth}):
+            alike = [point for point in of_truth if point.settings.tasks.crossing == crossing]
+            usual = min(alike, key=lambda point: (unusual[point.identity], point.settings.seed))
+            for name, table in _first(usual).items():
+                table.insert(0, "tasks.crossing", crossing)
+                tables[f"first_{name}"].append(table)
     return {name: _joined(parts) for name, parts in tables.items()}
 
 
@@ -120,6 +129,18 @@ def _example(point: Point) -> dict[str, pd.DataFrame]:
         "example_moves": _moves(point),
         "example_regions": _read(point, "regions"),
         "example_dimensions": _read(point, "dimensions"),
+    }
+
+
+def _first(point: Point) -> dict[str, pd.DataFrame]:
+    """The ranking by a point's first demonstrations, their paths and what each violates."""
+    paths, violations = _read(point, "paths"), _read(point, "violations")
+    first = sorted(paths["demonstration"].unique())[:FIRST]
+    shown = violations["trial"].isin(first) & (violations["source"] == "demonstration")
+    return {
+        "ranking": _named(point, _read(point, "first")),
+        "paths": paths[paths["demonstration"].isin(first)].round(_DECIMALS),
+        "violations": _with_boxes(violations[shown], "hypothesis", _hypothesis_boxes(point)),
     }
 
 
@@ -181,8 +202,14 @@ def _moves(point: Point) -> pd.DataFrame:
 
 def _violations(point: Point, trial: int) -> pd.DataFrame:
     """The hypotheses that a trial's demonstration and sampled trajectory violate, with corners."""
-    boxes = box_table("hypothesis", point.settings.candidates).drop(columns="hypothesis")
-    return _with_boxes(_of_trial(_read(point, "violations"), trial), "hypothesis", boxes)
+    return _with_boxes(
+        _of_trial(_read(point, "violations"), trial), "hypothesis", _hypothesis_boxes(point)
+    )
+
+
+def _hypothesis_boxes(point: Point) -> pd.DataFrame:
+    """The corners of every hypothesis."""
+    return box_table("hypothesis", point.settings.candidates).drop(columns="hypothesis")
 
 
 def _grid_boxes(grid: Grid) -> pd.DataFrame:

@@ -9,7 +9,7 @@ from experiments.settings import Settings
 from experiments.stages import TrialSet
 from mlci.constraints import ConstraintSet
 from mlci.inference import confidence, rank_constraints
-from mlci.metrics import random_subsets, truth_ranks
+from mlci.metrics import random_subsets, top_chances, truth_ranks
 from mlci.spaces import Bools, Floats, Ints, StateSpace
 
 # They are the same for all grids, time steps and actions: collate keeps one copy of each, opened
@@ -22,6 +22,8 @@ TRUTH_TABLES = {
 }
 
 PAPER_SIZE = 9  # demonstrations after which the paper looks at the rank
+FIRST = 5  # demonstrations of the paper's Fig. 7
+BEST = (1, 2)  # so many of the best hypotheses are compared with the truth, as in Fig. 7
 
 _PATH_EVERY = 5  # samples of a path between those that its table keeps
 
@@ -29,8 +31,16 @@ _PATH_EVERY = 5  # samples of a path between those that its table keeps
 def rank_table(
     settings: Settings, phi: Floats, violated: Bools, reachable: Bools, rng: np.random.Generator
 ) -> pd.DataFrame:
-    """A row a random subset of the demonstrations: the rank of the truth after them, if any."""
-    truth = settings.candidates.inside(settings.constraint)
+    """A row a random subset of the demonstrations: where the truth is in the ranking after them.
+
+    Beside the rank of the truth, if there is one, its columns are shares: whether that rank is
+    among the first, and whether the best hypothesis, or both of the best two, overlap the truth
+    or lie inside it.
+    """
+    candidates, constraint = settings.candidates, settings.constraint
+    truth = candidates.inside(constraint)
+    good = {"overlap": candidates.overlaps(constraint), "inside": truth}
+    best = [top for top in BEST if top <= len(candidates)] if len(constraint) else []
     wanted = settings.ranks
     rows = []
     for subsets in random_subsets(len(phi), wanted.demonstrations, wanted.subsets, rng):
@@ -44,6 +54,13 @@ def rank_table(
                     "reachable": np.sum(reachable[subsets], axis=1),
                     "rank": rank,
                     f"share_top_{wanted.top}": in_top,
+                    **{
+                        f"top_{top}_{name}": top_chances(phi, violated, which, subsets, top)
+                        if top in best
+                        else np.nan
+                        for name, which in good.items()
+                        for top in BEST
+                    },
                 }
             )
         )

@@ -106,6 +106,7 @@ class Planner(Sweeper):
         shortened: list[str] = []
         own = [quote_options(f"{key}={swept}") for key, swept in self.params.items()]
         for override in parser.parse_overrides(own):
+            _values(override)  # what cannot be swept is refused even where the command line wins
             if override.key_or_group not in given:
                 values[override.get_key_element()] = self._own_values(override, shortened)
         for override in typed:

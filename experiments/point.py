@@ -9,7 +9,7 @@ import pandas as pd
 
 from experiments.calibration import Shown, calibration_table
 from experiments.console import diagnosis_lines, measure_lines, ranking_lines, trial_line
-from experiments.measures import PAPER_SIZE, rank_table, ranking_table, truth_tables
+from experiments.measures import FIRST, PAPER_SIZE, rank_table, ranking_table, truth_tables
 from experiments.settings import Settings
 from experiments.stages import demonstrations, tabular_model
 from experiments.store import Store
@@ -40,10 +40,11 @@ def run_point(
 
     Returns:
         Tables by name: `trials`, a row a kept demonstration; `ranks`, a row a subset of
-        demonstrations; `hypotheses`, a row a hypothesis, ranked with all of them; `summary`, one
-        row; `sampled`, `violations`, `moves` and `probabilities`, of single trajectories; and the
-        TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`, `dimensions` of the state,
-        and `regions` of the truth. If asked for, `calibration`.
+        demonstrations; `hypotheses`, a row a hypothesis, ranked with all of them, and `first`,
+        with the first FIRST of them; `summary`, one row; `sampled`, `violations`, `moves` and
+        `probabilities`, of single trajectories; and the TRUTH_TABLES `attempts`, a row a start
+        and goal pair, `paths`, `dimensions` of the state, and `regions` of the truth. If asked
+        for, `calibration`.
     """
     trials = demonstrations(settings, store)
     kept = trials.kept(settings.demonstrations.keep)
@@ -72,21 +73,27 @@ def run_point(
     # Under the truth: final-state error and violation distance.
     constrained = forbid(mdp, np.arange(count, mdp.crosses.shape[1]))
     phi_truth = np.zeros_like(phi)
-    error = np.full(len(kept), np.nan)
-    trajectories = {}
+    feasible = np.zeros(len(kept), dtype=bool)
+    trajectories, controls = {}, []
     for j, trial in enumerate(kept):
         log_z = log_partition(constrained, starts[j], goals[j], steps)
-        if log_z[0, starts[j]] == -np.inf:
+        feasible[j] = log_z[0, starts[j]] > -np.inf
+        if not feasible[j]:
             continue
         phi_truth[j] = violation_probabilities(constrained, log_z, starts[j])[:count]
         rng = _stream(settings.seed, _ROLLOUTS, trial)
         cells, moves = sample_moves(constrained, log_z, starts[j], settings.rollouts, rng)
         trajectories[int(trial)] = cells[0], moves[0]
-        controls = actions[mdp.action[moves]]
+        controls.append(actions[mdp.action[moves]])
+    error = np.full(len(kept), np.nan)
+    if feasible.any():  # all at once: a step of the integrator costs the same for many
         substeps = int(np.ceil(dt / settings.demonstrations.dt - 1e-9))
-        final = rollout(system, trials.starts[trial], controls, dt, substeps)[:, -1]
-        error[j] = np.mean(final_state_error(system.space, final, trials.goal(trial)))
-    feasible = ~np.isnan(error)
+        origin = trials.starts[kept[feasible], None]
+        final = rollout(system, origin, np.stack(controls), dt, substeps)[..., -1, :]
+        error[feasible] = [
+            np.mean(final_state_error(system.space, ends, trials.goal(trial)))
+            for ends, trial in zip(final, kept[feasible], strict=True)
+        ]
 
     violated = hypotheses.violated_by(trials.states[kept])
     each, floor, shares = np.full((3, len(kept)), np.nan)
@@ -96,6 +103,8 @@ def run_point(
         shares[feasible] = distance.shares
 
     covered = hypotheses.inside(settings.constraint)
+    met = hypotheses.overlaps(settings.constraint)
+    likely = np.max(phi[:, covered], axis=1) if covered.any() else np.full(len(kept), np.nan)
     telling = telling_trial(feasible, phi, covered)
     shown = int(kept[telling]) if feasible.any() else None
     top = settings.ranks.top
@@ -111,12 +120,16 @@ def run_point(
                 "violation_distance": each,
                 "violation_floor": floor,
                 "violation_distance_pooled": shares,
+                "truth_probability": likely,
             }
         ),
         "ranks": ranks,
-        "hypotheses": ranking_table(
-            hypotheses, phi[reachable], violated, settings.inference.prior
-        ).assign(covered_by_truth=covered),
+        **{
+            name: ranking_table(
+                hypotheses, phi[:last][reachable[:last]], violated[:last], settings.inference.prior
+            ).assign(covered_by_truth=covered, overlaps_truth=met)
+            for name, last in (("hypotheses", len(kept)), ("first", FIRST))
+        },
         **trajectory_tables(
             mdp, trajectories, dict(zip(kept.tolist(), violated, strict=True)), shown
         ),
