@@ -27,6 +27,8 @@ from paper_figures import (
     scale,
     sensitivity,
     state_space,
+    success,
+    success_cases,
     trajectories,
     violation_distance,
 )
@@ -51,6 +53,8 @@ FIGURES: tuple[ModuleType, ...] = (
     in_cell,
     scale,
     sensitivity,
+    success,
+    success_cases,
 )
 
 

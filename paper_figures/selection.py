@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
 # What the paper's figures show, where a study holds it; the nearest that it holds otherwise.
 ACTIONS, SAMPLES = 9, 1
 
+DEFAULT = "default"  # the case of a study with which its others are compared
+
+_CROSSING = "tasks.crossing"  # the column of a study that has both kinds of tasks
 _MOST_TRUTHS = 4  # that have panels of their own in one figure
 
 
@@ -46,3 +49,24 @@ def described(rows: pd.DataFrame, step: str = "dt") -> str:
         f"truth {first['truth'].upper()}, {first['cells']} cells, {first['actions']} actions, "
         f"{step} = {first['dt']:g} s"
     )
+
+
+def by_tasks(table: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
+    """The rows of each kind of tasks, in words; all rows where a table knows but one kind."""
+    if _CROSSING not in table:
+        yield "all tasks", table
+        return
+    for crossing, rows in table.groupby(_CROSSING, sort=True):
+        yield "tasks that cross the truth" if crossing else "random tasks", rows
+
+
+def with_cases(cases: pd.DataFrame, table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a table of settings that some case names, with its name, in the cases' order.
+
+    Raises:
+        Unsuited: no case is the default.
+    """
+    if DEFAULT not in set(cases["case"]):
+        raise Unsuited(f"no case is named {DEFAULT}")
+    keys = [name for name in cases if name not in ("case", "choice", "value")]
+    return cases.merge(table, on=keys)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from paper_figures.selection import Unsuited
+from paper_figures.selection import DEFAULT, Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, GUIDE, PAGE, RC, VIOLATED, new_figure
 
 _KEYS = ("truth", "cells", "actions", "dt", "samples")
@@ -18,7 +18,6 @@ TABLES = {
     "rank_curve": (*_KEYS, "demonstrations", "median", "median_low", "median_high"),
 }
 EACH = "truth"
-DEFAULT = "default"  # the case that the others are compared with
 PAPER = 9  # demonstrations after which the paper finds the truth among the first
 
 _TOP = "share_top_5"

@@ -28,6 +28,7 @@ OTHER_COLOURS = ("#000000", "#d55e00", "#56b4e9", "#7f7f7f")
 TRUTH = "#d55e00"
 TRUTHS = (TRUTH, "#f3b28a")  # shades of one colour, for several truths in one figure
 DEMONSTRATION, SAMPLED = "#0072b2", "#cc79a7"
+TASKS = {"random tasks": ("#d55e00", "o"), "tasks that cross the truth": ("#0072b2", "^")}
 START, GOAL = "#56b4e9", "#009e73"
 GAIN, CHANCE = "YlGnBu", "PuRd"  # one colour each, dark for much: a hypothesis's gain and its Phi
 PATH = "#444444"  # of demonstrations among many

@@ -41,7 +41,17 @@ CLAIMS: tuple[tuple[Callable[[Results], Claim], tuple[Figure, ...]], ...] = (
     (violations.claim, (Figure("paper", "violation_distance", "Compare the paper's Fig. 4."),)),
     (ranking.claim, (Figure("paper", "rank_curve", "Compare the paper's Fig. 5."),)),
     (actions.claim, ()),
-    (telescope.claim, (Figure("telescope", "telescope", "Compare the paper's Fig. 7."),)),
+    (
+        telescope.claim,
+        (
+            Figure("telescope", "success_pain", "Compare the paper's Fig. 7."),
+            Figure(
+                "telescope",
+                "success_cases_pain",
+                "One choice changed at a time, and success against evidence.",
+            ),
+        ),
+    ),
 )
 
 # What follows the claims: a heading, what writes it, and its figures.

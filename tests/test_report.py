@@ -262,29 +262,59 @@ def test_claim_5_compares_on_the_same_demonstrations(results: Results) -> None:
     assert "| 5 actions | 32 of 32 | 32 of 32 | 32 of 32 | 32 of 32 | 28 of 32 |" in claim.why
 
 
-def test_claim_6_wants_both_best_hypotheses_and_the_time(tmp_path: Path) -> None:
-    opening = {"truth": "pain", "cells": 2500, "actions": "5x3", "dt": 0.5, "samples": 1}
-    shares = {
-        f"{name}{end}": value
-        for name in telescope.SHARES
-        for end, value in (("", 0.8), ("_low", 0.6), ("_high", 0.9))
+def telescope_tables() -> dict[str, pd.DataFrame]:
+    """The default and another case of both kinds of tasks; random tasks hold half the evidence."""
+    opening = {"truth": "pain", "cells": 2500, "actions": "5x3", "dt": 0.5}
+    rows, curve, means = [], [], []
+    for samples, cross in product((2, 1), (False, True)):
+        row = {"tasks.crossing": cross, **opening, "samples": samples}
+        case = "default" if samples == 2 else "start points in a cell: 1"
+        rows.append({**row, "case": case, "choice": case, "value": ""})
+        chance = 0.5 if cross else 0.25
+        means.append({**row, "measure": "truth_probability", "mean": chance})
+        for size in (5, 10, 20):
+            part = 0.8 + 0.005 * size * chance
+            shares = {
+                f"{name}{end}": value
+                for name in telescope.SHARES
+                for end, value in (("", part), ("_low", 0.6), ("_high", 0.95))
+            }
+            curve.append({**row, "demonstrations": size, "median": 1.5, **shares})
+    return {
+        "cases": pd.DataFrame(rows),
+        "rank_curve": pd.DataFrame(curve),
+        "measures": pd.DataFrame(means),
     }
-    table = pd.DataFrame(
-        [
-            {"tasks.crossing": cross, **opening, "demonstrations": 5, "median": 1.5, **shares}
-            for cross in (False, True)
-        ]
-    )
-    write(tmp_path, "telescope", rank_curve=table)
+
+
+def test_claim_6_wants_both_best_hypotheses_and_the_time(tmp_path: Path) -> None:
+    tables = telescope_tables()
+    write(tmp_path, "telescope", **tables)
     claim = telescope.claim(Results(tmp_path))
     assert claim.verdict is Verdict.REPRODUCED
-    assert [check.setting for check in claim.parts[0].checks] == [
-        "tasks.crossing False",
-        "tasks.crossing True",
+    assert [part.statement for part in claim.parts[:2]] == [
+        "the best two overlap the truth after 5 demonstrations of random tasks",
+        "the best two overlap the truth after 5 demonstrations of tasks that cross the truth",
     ]
-    table.loc[1, "top_2_overlap_low"] = 0.4
-    write(tmp_path, "telescope", rank_curve=table)
-    assert parts(telescope.claim(Results(tmp_path))) == [(1, 2), (1, 1)]
+    assert parts(claim) == [(2, 2), (2, 2), (2, 2), (2, 2), (1, 1)]
+    curve = tables["rank_curve"]
+    where = curve["tasks.crossing"] & (curve["samples"] == 1) & (curve["demonstrations"] == 5)
+    curve.loc[where, "top_2_overlap_low"] = 0.4
+    curve.loc[where, "top_2_inside_low"] = 0.5
+    write(tmp_path, "telescope", **tables)
+    claim = telescope.claim(Results(tmp_path))
+    assert parts(claim) == [(2, 2), (1, 2), (2, 2), (2, 2), (1, 1)]
+    assert claim.verdict is Verdict.PARTLY
+    assert "does not hold: start points in a cell: 1 (81 % [40, 95 %])." in claim.markdown()
+
+
+def test_claim_6_compares_sets_of_equal_evidence(tmp_path: Path) -> None:
+    """20 random demonstrations at 0.25 hold as much as 10 others at 0.5."""
+    write(tmp_path, "telescope", **telescope_tables())
+    why = telescope.claim(Results(tmp_path)).why
+    assert "20 random demonstrations hold as much evidence (5.0) as 10 of tasks that cross" in why
+    assert "with the share that overlaps is 1.0, and with the share inside 1.0." in why
+    assert "after the former 82 % of the sets overlap and 82 % lie inside, after the latter " in why
 
 
 def test_sensitivity_counts_where_the_truth_is_found_in_each_case(results: Results) -> None:
