@@ -94,7 +94,8 @@ class ConstraintSet:
     def inside(self, other: ConstraintSet) -> Bools:
         """(C,) which regions lie entirely in one region of `other` (to 1e-9 of the bounds).
 
-        What a region holds beyond the bounds of the state space does not count.
+        What a region holds beyond the bounds of the state space does not count, and one that holds
+        nothing else is inside nothing.
         """
         widths, periodic = self.space.bounds.widths, self.space.periodic
         slack = 1e-9 * widths
@@ -106,7 +107,7 @@ class ConstraintSet:
             fits = (ahead >= -slack) & (ahead + mine[1] - mine[0] <= upper - lower + slack)
             all_round = periodic & (upper - lower >= widths - slack)
             covered |= np.all(fits | all_round, axis=1)
-        return covered
+        return covered & np.all(mine[1] - mine[0] > slack, axis=1)
 
     def overlaps(self, other: ConstraintSet) -> Bools:
         """(C,) which regions share more than an edge with some region of `other`.
@@ -124,8 +125,9 @@ class ConstraintSet:
             behind -= np.where(periodic, np.floor((behind + slack) / widths) * widths, 0.0)
             begins_in_mine = (ahead > -slack) & (ahead < mine[1] - mine[0] - slack)
             begins_in_theirs = (behind > -slack) & (behind < upper - lower - slack)
-            shared |= np.all(begins_in_mine | begins_in_theirs, axis=1)
-        return shared
+            if np.all(upper - lower > slack):
+                shared |= np.all(begins_in_mine | begins_in_theirs, axis=1)
+        return shared & np.all(mine[1] - mine[0] > slack, axis=1)
 
     def _within_bounds(self) -> tuple[Floats, Floats]:
         """Finite corners (C, n): cut to the bounds, and to one period where a region goes round."""

@@ -11,6 +11,8 @@ ACTIONS, SAMPLES = 9, 1
 
 DEFAULT = "default"  # the case of a study with which its others are compared
 
+ALL_TASKS = "all tasks"
+
 _CROSSING = "tasks.crossing"  # the column of a study that has both kinds of tasks
 _MOST_TRUTHS = 4  # that have panels of their own in one figure
 
@@ -54,7 +56,7 @@ def described(rows: pd.DataFrame, step: str = "dt") -> str:
 def by_tasks(table: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """The rows of each kind of tasks, in words; all rows where a table knows but one kind."""
     if _CROSSING not in table:
-        yield "all tasks", table
+        yield ALL_TASKS, table
         return
     for crossing, rows in table.groupby(_CROSSING, sort=True):
         yield "tasks that cross the truth" if crossing else "random tasks", rows

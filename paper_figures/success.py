@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from paper_figures.plane import Plane, numbered
-from paper_figures.selection import DEFAULT, Unsuited, by_tasks, described, with_cases
+from paper_figures.selection import ALL_TASKS, DEFAULT, Unsuited, by_tasks, described, with_cases
 from paper_figures.style import (
     DEMONSTRATION,
     EDGE,
@@ -105,7 +105,7 @@ def draw(
                 strict=True,
             ):
                 for place, top in enumerate(_CURVES):
-                    _draw_share(axes, curves[words], f"top_{top}_{name}", place)
+                    _draw_share(axes, _of_tasks(curves, words), f"top_{top}_{name}", place)
                 axes.axvline(PAPER, color=GUIDE, linewidth=0.6, linestyle=":")
                 axes.set_ylim(-3, 103)
                 axes.set_title(meaning, loc="left")
@@ -144,7 +144,7 @@ def facts(
                 f"  {place}: hypothesis {row.hypothesis}, gain {row.gain:.3g} nat, posterior "
                 f"{row.posterior:.3g}, {where} the truth"
             )
-        curve = curves[words]
+        curve = _of_tasks(curves, words)
         for row in curve[curve["demonstrations"].isin(_LISTED)].to_dict("records"):
             shares = ", ".join(
                 f"{_CURVES[top]} {name} "
@@ -154,9 +154,9 @@ def facts(
                 for name in ("overlap", "inside")
                 for top in _CURVES
             )
-            lines.append(
-                f"  {row['demonstrations']} demonstrations, {row['seeds']} seeds: {shares}"
-            )
+            several = "s" * (row["demonstrations"] > 1)
+            shown = f"{row['demonstrations']} demonstration{several}, {row['seeds']} seeds"
+            lines.append(f"  {shown}: {shares}")
     return "\n".join(lines)
 
 
@@ -164,6 +164,11 @@ def _default_curves(cases: pd.DataFrame, rank_curve: pd.DataFrame) -> dict[str, 
     """The rows of the default case, by the kind of tasks in words."""
     joined = with_cases(cases, rank_curve)
     return dict(by_tasks(joined[joined["case"] == DEFAULT]))
+
+
+def _of_tasks(curves: dict[str, pd.DataFrame], words: str) -> pd.DataFrame:
+    """The curve of a kind of tasks, in a study that may have but one."""
+    return curves[words if words in curves else ALL_TASKS]
 
 
 def _best(ranking: pd.DataFrame) -> pd.DataFrame:

@@ -66,9 +66,10 @@ def draw(
     )
     with plt.rc_context(RC):
         for number, (axes, (name, count)) in enumerate(zip(grid, columns, strict=False)):
-            for place, (words, rows) in enumerate(by_tasks(table)):
+            kinds = list(by_tasks(table))
+            for place, (words, rows) in enumerate(kinds):
                 own = rows[rows["demonstrations"] == count]
-                y = own["case"].map(names.index) + _SPREAD * (place - 0.5)
+                y = own["case"].map(names.index) + _SPREAD * (place - (len(kinds) - 1) / 2)
                 _draw_dots(axes, own, name, y, words)
             for line in range(1, len(names)):
                 axes.axhline(line - 0.5, color=VIOLATED, linewidth=0.6, zorder=0)

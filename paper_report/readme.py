@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 
-from paper_report import in_cell, provenance, ranking, timings
+from paper_report import in_cell, provenance, ranking, telescope, timings
 from paper_report.markdown import by_dt
 from paper_report.report import verdicts
 from paper_report.results import Missing, Results, absent, paper_rows
@@ -47,6 +47,7 @@ BLOCKS: Mapping[str, Callable[[Results], str]] = {
     "verdicts": verdicts,
     "ranks": _ranks,
     "in_cell": in_cell.sentence,
+    "telescope": telescope.success,
     "costs": provenance.costs,
     "points": timings.points,
 }

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from figure_study import cell_boxes, dimension_rows, path_rows, region_rows
 
 LIMITS = ("", "_low", "_high")
 
@@ -83,10 +84,98 @@ def calibration_tables() -> dict[str, pd.DataFrame]:
     return {"reliability": pd.DataFrame(rows)}
 
 
+# The case of a name, with what it changes of the default's settings.
+SUCCESS_CASES = {
+    "default": {},
+    "start points in a cell: 1": {"samples": 1},
+    "time step: 0.25 s": {"dt": 0.25},
+    "time step: 1 s": {"dt": 1.0},
+    "velocity cells: 7 in place of 5": {"cells": 4900},
+    "temperature: 0.3": {"temperature": 0.3},
+}
+KINDS = {False: "random tasks", True: "tasks that cross the truth"}
+FIRST_POINTS = {False: "4" * 32, True: "5" * 32}
+
+
+def first_rows(crossing: bool) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Nine hypotheses, of which the truth holds the last and cuts 4, 5 and 7; three paths.
+
+    The best are 8 and 5 for random tasks, and 2, off the truth, and 4 for those that cross it.
+    """
+    gain = np.array([0.0, 0.0, 0.25, -np.inf, 0.0, 1.5, -np.inf, -np.inf, 6.0])
+    if crossing:
+        gain[[2, 4, 5, 7, 8]] = [4.0, 2.5, 2.0, 0.0, -np.inf]
+    ranking = pd.DataFrame(
+        {
+            **{"tasks.crossing": crossing, "point": FIRST_POINTS[crossing], "seed": 0},
+            **settings_row(2500, 0.5, 3),
+            "hypothesis": range(9),
+            **cell_boxes(list(range(9)), 3),
+            "feasible": gain > -np.inf,
+            "gain": gain,
+            "rank": pd.Series(-gain).rank(),
+            "posterior": np.exp(gain) / (20 + np.exp(gain).sum()),
+            "covered_by_truth": np.arange(9) == 8,
+            "overlaps_truth": np.isin(np.arange(9), [4, 5, 7, 8]),
+        }
+    )
+    own = path_rows().query("truth == 'c1'")
+    if crossing:
+        own = own.assign(angle=own["angle"] + 0.7, speed=-own["speed"])
+    third = own[own["demonstration"] == 0].assign(speed=1.7)
+    paths = pd.concat([own, third.assign(demonstration=2)])
+    # Demonstrations have the numbers of their trials.
+    paths = paths.assign(demonstration=paths["demonstration"].map({0: 3, 1: 4, 2: 7}))
+    pairs = [(3, 3), (3, 6), (4, 6), (4, 7 + crossing), (7, 3)]
+    violations = pd.DataFrame(pairs, columns=["trial", "hypothesis"]).assign(truth="c1")
+    boxes = pd.DataFrame(cell_boxes(violations["hypothesis"].tolist(), 3))
+    violations = violations.assign(source="demonstration", **boxes)
+    return ranking, *(table.assign(**{"tasks.crossing": crossing}) for table in (paths, violations))
+
+
+def success_tables() -> dict[str, pd.DataFrame]:
+    """Two kinds of tasks in each of some cases, and settings that no case names."""
+    rng = np.random.default_rng(3)
+    firsts = zip(*(first_rows(crossing) for crossing in KINDS), strict=True)
+    names = ("first_ranking", "first_paths", "first_violations")
+    usual = {"temperature": 1.0, **settings_row(2500, 0.5, 3)}
+    groups, cases = [], []
+    for case, change in {**SUCCESS_CASES, "": {"dt": 2.0}}.items():
+        for crossing in KINDS:
+            groups.append({"tasks.crossing": crossing, **usual, **change})
+            if case:
+                choice, _, value = case.partition(": ")
+                cases.append({**groups[-1], "case": case, "choice": choice, "value": value})
+    curve, measures = [], []
+    for group in groups:
+        measures += [
+            {**group, "measure": name, "mean": rng.random()}
+            for name in ("reachable", "truth_probability")
+        ]
+        for count in range(1, 21):
+            row = {**group, "demonstrations": count, "seeds": 3}
+            for name in ("overlap", "inside"):
+                for top in (1, 2):
+                    low, middle, high = np.sort(rng.random(3)) * (1 - 0.5 / count)
+                    ends = (f"top_{top}_{name}{end}" for end in LIMITS)
+                    row |= dict(zip(ends, (middle, low, high), strict=True))
+            curve.append(row)
+    return {
+        **{name: pd.concat(parts) for name, parts in zip(names, firsts, strict=True)},
+        "example_regions": region_rows().query("truth == 'c1'"),
+        "example_dimensions": dimension_rows().query("truth == 'c1'"),
+        "cases": pd.DataFrame(cases),
+        "measures": pd.DataFrame(measures),
+        "rank_curve": pd.DataFrame(curve),
+    }
+
+
 def known_tables() -> dict[str, dict[str, pd.DataFrame]]:
     """The tables that each figure is drawn from, by its module."""
     return {
         "sensitivity": sensitivity_tables(),
         "in_cell": in_cell_tables(),
         "calibration": calibration_tables(),
+        "success": success_tables(),
+        "success_cases": success_tables(),
     }

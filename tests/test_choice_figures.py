@@ -3,18 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import ModuleType
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from choice_studies import LIMITS, calibration_tables, in_cell_tables, sensitivity_tables
+from choice_studies import (
+    FIRST_POINTS,
+    KINDS,
+    LIMITS,
+    SUCCESS_CASES,
+    calibration_tables,
+    in_cell_tables,
+    sensitivity_tables,
+    success_tables,
+)
 from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection, PolyCollection
 from matplotlib.colors import to_hex
+from matplotlib.container import ErrorbarContainer
+from matplotlib.figure import Figure
 
-from paper_figures import calibration, in_cell, sensitivity
+from paper_figures import calibration, in_cell, sensitivity, success, success_cases
 from paper_figures.selection import Unsuited
-from paper_figures.style import CELL_COLOURS, CELL_MARKS, STEP_MARKS
+from paper_figures.style import (
+    CELL_COLOURS,
+    CELL_MARKS,
+    DEMONSTRATION,
+    SAMPLED,
+    STEP_MARKS,
+    TRUTH,
+)
 
 MEAN = ["mean", "low", "high"]
 
@@ -29,6 +49,10 @@ def closed() -> Iterator[None]:
 def bars(axes: Axes, label: str) -> np.ndarray:
     """Marks (x, y) and ends (low, high) of the error bars of a label, in the axes' first sense."""
     (container,) = (each for each in axes.containers if each.get_label() == label)
+    return marks_and_ends(container)
+
+
+def marks_and_ends(container: ErrorbarContainer) -> np.ndarray:
     line, _, (lines,) = container
     ends = np.array(lines.get_segments(), dtype=float)
     along = 0 if np.ptp(ends[0, :, 0]) > 0 else 1
@@ -173,3 +197,259 @@ def test_calibration_says_what_is_right() -> None:
     assert f"  model, printed, 1: {said}" in lines
     with pytest.raises(Unsuited, match="rows differ in more than source, demonstrations, belief"):
         calibration.draw(pd.concat([table, table]))
+
+
+def given(module: ModuleType) -> dict[str, pd.DataFrame]:
+    """The tables that a figure of success needs."""
+    tables = success_tables()
+    return {name: tables[name] for name in module.TABLES}
+
+
+def of_default(table: pd.DataFrame, crossing: bool) -> pd.DataFrame:
+    """The rows of the settings that the default case has."""
+    key = "dt == 0.5 and samples == 3 and cells == 2500 and temperature == 1"
+    return table.query(key)[lambda rows: rows["tasks.crossing"] == crossing]
+
+
+def signs(figure: Figure) -> dict[str, tuple[str, str]]:
+    """Colour and mark of each line in the legend."""
+    (legend,) = figure.legends
+    words = [text.get_text() for text in legend.get_texts()]
+    return {
+        word: (to_hex(line.get_color()), line.get_marker())
+        for word, line in zip(words, legend.legend_handles, strict=True)
+        if hasattr(line, "get_marker")
+    }
+
+
+def corners(table: pd.DataFrame) -> np.ndarray:
+    """(N, 4) lower and upper corners of boxes."""
+    sides = [f"{side}_{name}" for side in ("lower", "upper") for name in ("angle", "speed")]
+    return table[sides].to_numpy(dtype=float)
+
+
+def extent(boxes: PatchCollection) -> np.ndarray:
+    vertices = [path.vertices for path in boxes.get_paths()]
+    return np.array([[*each.min(axis=0), *each.max(axis=0)] for each in vertices])
+
+
+def wrapped(path: np.ndarray) -> np.ndarray:
+    """Points whose angle is in the first turn."""
+    return np.column_stack([path[:, 0] % (2 * np.pi), path[:, 1]])
+
+
+def test_success_curves_are_the_shares_of_the_default_case() -> None:
+    tables = given(success)
+    figure = success.draw(**tables)
+    drawn = signs(figure)
+    for row, crossing in zip(np.reshape(figure.axes, (2, 3)), KINDS, strict=True):
+        rows = of_default(tables["rank_curve"], crossing)
+        assert rows["demonstrations"].tolist() == list(range(1, 21))
+        for axes, name in zip(row[1:], ("overlap", "inside"), strict=True):
+            assert name in axes.get_title(loc="left")
+            lines = {(to_hex(line.get_color()), line.get_marker()): line for line in axes.lines}
+            bands = {
+                to_hex(band.get_facecolor()[0]): band.get_paths()[0].vertices
+                for band in axes.collections
+                if isinstance(band, PolyCollection)
+            }
+            assert len(bands) == 2
+            for top, words in ((1, "the best"), (2, "both of the best two")):
+                sign = drawn[words]
+                middle, low, high = (100 * rows[f"top_{top}_{name}{end}"] for end in LIMITS)
+                x, y = lines[sign].get_data()
+                np.testing.assert_array_equal(x, rows["demonstrations"])
+                np.testing.assert_allclose(y, middle)
+                for number, ends in zip(x, zip(low, high, strict=True), strict=True):
+                    there = bands[sign[0]][:, 0] == number
+                    of_number = bands[sign[0]][there, 1]
+                    assert (of_number.min(), of_number.max()) == pytest.approx(ends)
+            (paper,) = (line for line in axes.lines if len(line.get_xdata()) == 2)
+            assert paper.get_xdata() == [5, 5]
+
+
+def test_success_shows_the_first_demonstrations_and_the_best() -> None:
+    tables = given(success)
+    figure = success.draw(**tables)
+    for (axes, *_), (crossing, words) in zip(
+        np.reshape(figure.axes, (2, 3)), KINDS.items(), strict=True
+    ):
+        ranking, paths, violations = (
+            tables[f"first_{name}"][lambda rows, kind=crossing: rows["tasks.crossing"] == kind]
+            for name in ("ranking", "paths", "violations")
+        )
+        assert axes.get_title(loc="left") == f"{words}: 3 shown"
+        every, *hatched = axes.collections
+        np.testing.assert_allclose(extent(every), corners(ranking))
+        colours = [to_hex(boxes.get_edgecolor()[0]) for boxes in hatched]
+        assert colours == [DEMONSTRATION, SAMPLED]
+        assert len({boxes.get_hatch() for boxes in hatched}) == 2
+        lines = {to_hex(line.get_color()): line for line in axes.lines if len(line.get_xdata()) > 1}
+        for boxes, colour, trial in zip(hatched, colours, (3, 4), strict=True):
+            expected = violations[violations["trial"] == trial]
+            np.testing.assert_allclose(extent(boxes), corners(expected))
+            line = lines[colour].get_xydata()
+            path = paths.loc[paths["demonstration"] == trial, ["angle", "speed"]].to_numpy()
+            np.testing.assert_allclose(line[~np.isnan(line).any(axis=1)], wrapped(path))
+            ends = [each for each in axes.lines if len(each.get_xdata()) == 1]
+            ends = [each for each in ends if to_hex(each.get_color()) == colour]
+            assert [end.get_marker() for end in ends] == ["o", "s"]
+            np.testing.assert_allclose(
+                [end.get_xydata()[0] for end in ends], wrapped(path)[[0, -1]]
+            )
+        assert len(lines) == 2
+        filled = {to_hex(patch.get_facecolor()): patch for patch in axes.patches}
+        truth = filled[TRUTH].get_bbox()
+        np.testing.assert_allclose(truth.extents, corners(tables["example_regions"])[0])
+        outlined = [patch for patch in axes.patches if not patch.get_fill()]
+        best = [2, 4] if crossing else [8, 5]
+        np.testing.assert_allclose(
+            [patch.get_bbox().extents for patch in outlined],
+            corners(ranking.set_index("hypothesis").loc[best]),
+        )
+        assert [text.get_text() for text in axes.texts] == ["1", "2"]
+        for text, patch in zip(axes.texts, outlined, strict=True):
+            assert patch.get_bbox().contains(*text.get_position())
+
+
+def test_success_outlines_none_that_gains_nothing() -> None:
+    tables = given(success)
+    ranking = tables["first_ranking"]
+    poor = ranking.assign(gain=ranking["gain"].where(ranking["hypothesis"] == 5, 0.0))
+    poor = poor.assign(rank=np.where(poor["hypothesis"] == 5, 1.0, 5.5))
+    poor.loc[poor["tasks.crossing"], "gain"] = 0.0
+    figure = success.draw(**{**tables, "first_ranking": poor})
+    planes = np.reshape(figure.axes, (2, 3))[:, 0]
+    assert [[text.get_text() for text in axes.texts] for axes in planes] == [["1"], []]
+
+
+def test_success_says_the_numbers() -> None:
+    tables = given(success)
+    lines = success.facts(**tables).splitlines()
+    best = {False: [(8, "inside"), (5, "across")], True: [(2, "off"), (4, "across")]}
+    for crossing, words in KINDS.items():
+        (start,) = (k for k, line in enumerate(lines) if line.startswith(f"{words}: point "))
+        assert f"point {FIRST_POINTS[crossing]}, truth C1, 2500 cells, 9 actions" in lines[start]
+        assert lines[start].endswith("dt = 0.5 s.")
+        ranking = tables["first_ranking"][lambda t, kind=crossing: t["tasks.crossing"] == kind]
+        ranking = ranking.set_index("hypothesis")
+        for place, (number, where) in enumerate(best[crossing], start=1):
+            gain, posterior = ranking.loc[number, ["gain", "posterior"]]
+            said = f"gain {gain:.3g} nat, posterior {posterior:.3g}, {where} the truth"
+            assert lines[start + place] == f"  {place}: hypothesis {number}, {said}"
+        rows = of_default(tables["rank_curve"], crossing).set_index("demonstrations")
+        for line, count in zip(lines[start + 3 : start + 8], (1, 3, 5, 10, 20), strict=True):
+            shown = "demonstration" if count == 1 else "demonstrations"
+            assert line.startswith(f"  {count} {shown}, 3 seeds: the best overlap ")
+            for top, which in ((1, "the best"), (2, "both of the best two")):
+                for name in ("overlap", "inside"):
+                    values = [100 * rows[f"top_{top}_{name}{end}"][count] for end in LIMITS]
+                    assert (
+                        f"{which} {name} " + "{:.0f} % ({:.0f} to {:.0f})".format(*values) in line
+                    )
+
+
+def test_success_cases_draws_each_case_with_its_interval() -> None:
+    tables = given(success_cases)
+    figure = success_cases.draw(**tables)
+    *panels, _ = figure.axes
+    shares = [(name, count) for name in ("overlap", "inside") for count in (5, 10)]
+    drawn = signs(figure)
+    assert list(drawn) == list(KINDS.values())
+    names = [text.get_text() for text in panels[0].get_yticklabels()]
+    assert names == list(SUCCESS_CASES)
+    rows = tables["cases"].merge(tables["rank_curve"])
+    for axes, (name, count) in zip(panels, shares, strict=True):
+        assert axes.get_title().split() == [f"{name},", str(count), "shown"]
+        assert axes.yaxis_inverted()
+        for container, (crossing, words) in zip(axes.containers, KINDS.items(), strict=True):
+            assert (to_hex(container[0].get_color()), container[0].get_marker()) == drawn[words]
+            own = rows[(rows["demonstrations"] == count) & (rows["tasks.crossing"] == crossing)]
+            own = own.set_index("case").loc[names]
+            expected = 100 * own[[f"top_2_{name}{end}" for end in LIMITS]].to_numpy()
+            found = marks_and_ends(container)
+            np.testing.assert_array_equal(np.round(found[:, 1]), range(len(names)))
+            np.testing.assert_allclose(found[:, [0, 2, 3]], expected)
+        first, second = (marks_and_ends(container)[:, 1] for container in axes.containers)
+        assert (first < second).all()
+
+
+def test_success_cases_draws_every_share_over_the_evidence() -> None:
+    tables = given(success_cases)
+    figure = success_cases.draw(**tables)
+    axes, drawn = figure.axes[-1], signs(figure)
+    lines = [line for line in axes.lines if len(line.get_xdata()) > 2]
+    assert len(lines) == len(SUCCESS_CASES) * len(KINDS)
+    measures = tables["measures"].query("measure == 'truth_probability'")
+    for crossing, words in KINDS.items():
+        own = [line for line in lines if to_hex(line.get_color()) == drawn[words][0]]
+        for line, (case, change) in zip(own, SUCCESS_CASES.items(), strict=True):
+            settings = {"temperature": 1.0, "cells": 2500, "dt": 0.5, "samples": 3, **change}
+            curve, chance = (
+                table.query(" and ".join(f"{key} == {value}" for key, value in settings.items()))[
+                    lambda rows, kind=crossing: rows["tasks.crossing"] == kind
+                ]
+                for table in (tables["rank_curve"], measures)
+            )
+            (mean,) = chance["mean"]
+            np.testing.assert_allclose(line.get_xdata(), mean * np.arange(1, 21))
+            np.testing.assert_allclose(line.get_ydata(), 100 * curve["top_2_overlap"])
+            filled = to_hex(line.get_markerfacecolor()) == drawn[words][0]
+            assert filled == (case == "default"), case
+            assert line.get_marker() == drawn[words][1]
+
+
+@pytest.mark.parametrize("module", [success, success_cases])
+def test_a_study_of_one_kind_of_tasks_has_no_column_for_it(module: ModuleType) -> None:
+    tables = given(module)
+    kind = {name: t[~t["tasks.crossing"]] for name, t in tables.items() if "tasks.crossing" in t}
+    ranking = kind.pop("first_ranking")
+    alone = {name: t if name.startswith("first") else t.drop(columns="tasks.crossing")
+             for name, t in kind.items()}  # fmt: skip
+    one = {**tables, **alone, "first_ranking": ranking}
+    both = module.draw(**tables)
+    figure = module.draw(**one)
+    assert len(figure.axes) == (len(both.axes) // 2 if module is success else len(both.axes))
+    words = "random tasks" if module is success else "all tasks"
+    assert any(line.strip().startswith(words) for line in module.facts(**one).splitlines())
+
+
+def test_success_cases_show_what_there_is() -> None:
+    tables = given(success_cases)
+    few = tables["rank_curve"].query("demonstrations < 4")
+    figure = success_cases.draw(**{**tables, "rank_curve": few})
+    titles = [" ".join(axes.get_title().split()) for axes in figure.axes]
+    assert titles == ["overlap, 3 shown", "inside, 3 shown", "overlap, all cases"]
+
+
+def test_success_cases_says_the_numbers() -> None:
+    tables = given(success_cases)
+    lines = success_cases.facts(**tables).splitlines()
+    assert "1 to 20 demonstrations" in lines[1]
+    found = [line for line in lines if line.startswith("  ")]
+    assert len(found) == 2 * len(KINDS) * len(SUCCESS_CASES)
+    for crossing, words in KINDS.items():
+        row = of_default(tables["rank_curve"], crossing).query("demonstrations == 10").iloc[0]
+        chance = of_default(tables["measures"], crossing).query("measure == 'truth_probability'")
+        said = [
+            f"{name} "
+            + "{:.0f} % ({:.0f} to {:.0f})".format(
+                *(100 * row[f"top_2_{name}{end}"] for end in LIMITS)
+            )
+            for name in ("overlap", "inside")
+        ]
+        evidence = f"evidence {10 * chance['mean'].iloc[0]:.3g}"
+        assert f"  {words}, default, 10 demonstrations: {', '.join(said)}; {evidence}" in found
+
+
+@pytest.mark.parametrize("module", [success, success_cases])
+def test_success_needs_a_truth_across_hypotheses_and_a_default(module: ModuleType) -> None:
+    tables = given(module)
+    ranking = tables["first_ranking"]
+    whole = ranking.assign(overlaps_truth=ranking["covered_by_truth"])
+    with pytest.raises(Unsuited, match="the truth is made of whole hypotheses"):
+        module.draw(**{**tables, "first_ranking": whole})
+    unnamed = tables["cases"].assign(case="mine")
+    for make in (module.draw, module.facts):
+        with pytest.raises(Unsuited, match="no case is named default"):
+            make(**{**tables, "cases": unnamed})

@@ -185,7 +185,11 @@ def test_signed_distance_is_that_of_the_nearest_region():
 
 def test_inside_agrees_with_sampled_points():
     truth = regions(
-        CYLINDER, ((5.0, 7.6), (-3.0, 0.0)), (FREE, (4.0, 6.0)), ((1.0, 2.0), (0.0, 1.0))
+        CYLINDER,
+        ((5.0, 7.6), (-3.0, 0.0)),
+        (FREE, (4.0, 6.0)),
+        ((1.0, 2.0), (0.0, 1.0)),
+        ((1.0, 2.0), (-7.0, -5.0)),  # reaches out of the state space
     )
     hypotheses = ConstraintSet.from_grid(CYLINDER, (20, 24)).joined(
         regions(
@@ -199,6 +203,7 @@ def test_inside_agrees_with_sampled_points():
             ((1.0, 1.0 + TURN), (4.0, 5.0)),
             ((-1.0, 1.0), (4.5, 5.5)),  # across the wrap, where the truth has no sides
             (FREE, (5.0, 9.0)),  # sticks out of the state space only
+            ((1.2, 1.8), (-9.0, -7.0)),  # is outside of it
         )
     )
     share = np.random.default_rng(4).uniform(0.001, 0.999, size=(400, 2))
@@ -207,7 +212,7 @@ def test_inside_agrees_with_sampled_points():
         box = hypotheses.box(i)
         lower, upper = np.maximum(box.lower, [-TURN, -6.0]), np.minimum(box.upper, [2 * TURN, 6.0])
         points = lower + share * (upper - lower)
-        expected.append(meets(truth, points).all(axis=0).any())
+        expected.append(bool(np.all(lower < upper)) and meets(truth, points).all(axis=0).any())
     np.testing.assert_array_equal(hypotheses.inside(truth), expected)
     assert 10 < sum(expected) < 200
 
@@ -264,8 +269,8 @@ def test_overlaps_is_to_share_a_cell_of_a_lattice(seed):
     centres = centres * step - [0.0, 6.0]
 
     def drawn() -> ConstraintSet:
-        lower = rng.integers([-12, -2], [18, 24], size=(60, 2))
-        upper = lower + rng.integers([1, 3], [16, 9], size=(60, 2))
+        lower = rng.integers([-12, -6], [18, 28], size=(60, 2))
+        upper = lower + rng.integers([1, 1], [16, 9], size=(60, 2))
         lower, upper = (corner * step - [0.0, 6.0] for corner in (lower, upper))
         free = rng.random((60, 2)) < 0.05
         return ConstraintSet(

@@ -10,7 +10,7 @@ import pytest
 from experiments import attempt, examples
 from experiments.examples import example_tables
 from experiments.record import Point
-from experiments.settings import GridSettings, Settings
+from experiments.settings import GridSettings, Region, Settings, TruthSettings
 from mlci.grids import Grid
 
 SHAPES = [(12, 8), (24, 12), (30, 30)]
@@ -156,6 +156,76 @@ def test_example_has_the_settings_of_most_points(points: list[Point]) -> None:
     # All are equally near; temperature 0.5 comes first in tables.
     for order in ([cold, points[0], often], [often, points[0], cold]):
         assert set(example_tables(order)["example_ranking"]["point"]) == {points[0].identity}
+
+
+def test_first_are_those_of_the_point_with_the_settings_of_most(points: list[Point]) -> None:
+    def point(dt: float) -> Point:
+        wanted = SHAPES[1], dt, 0
+        (found,) = (
+            p for p in points if (p.settings.grid.shape, p.settings.dt, p.settings.seed) == wanted
+        )
+        return found
+
+    near, usual = point(0.25), point(0.5)
+    most = [p for p in points if p.settings.dt == 0.5 or p.settings.seed == 1]
+    tables = example_tables([near, *most])
+    assert set(tables["example_ranking"]["point"]) == {near.identity}
+    ranking = tables["first_ranking"]
+    assert ranking.columns[:2].tolist() == ["tasks.crossing", "point"]
+    assert set(ranking["point"]) == {usual.identity}
+    assert set(ranking["tasks.crossing"]) == {False}
+    own = table_of(usual, "first")
+    pd.testing.assert_frame_equal(ranking[list(own.columns)], own)
+    trials = table_of(usual, "trials")["trial"]
+    assert len(trials) > 5
+    first = sorted(trials)[:5]
+    paths = table_of(usual, "paths")
+    paths = paths[paths["demonstration"].isin(first)].reset_index(drop=True)
+    assert paths["demonstration"].unique().tolist() == first
+    found = tables["first_paths"].drop(columns="tasks.crossing")
+    pd.testing.assert_frame_equal(found, paths, check_exact=False, atol=5.1e-5, rtol=0)
+
+
+def test_first_violations_are_those_of_demonstrations_with_corners(points: list[Point]) -> None:
+    tables = example_tables([point for point in points if point.settings.dt == 0.5])
+    violations, shown = tables["first_violations"], set(tables["first_ranking"]["point"])
+    (usual,) = (point for point in points if point.identity in shown)
+    own = table_of(usual, "violations")
+    first = sorted(table_of(usual, "trials")["trial"])[:5]
+    of_first = own[own["trial"].isin(first)]
+    assert set(of_first["source"]) == {"demonstration", "sampled"}
+    kept = of_first[of_first["source"] == "demonstration"]
+    assert set(kept["trial"]) == set(first)
+    columns = ["trial", "source", "hypothesis"]
+    assert violations[columns].to_numpy().tolist() == kept[columns].to_numpy().tolist()
+    # Ten hypotheses of 0.6 m from -3 m on.
+    np.testing.assert_allclose(violations["lower_position"], 0.6 * violations["hypothesis"] - 3)
+    np.testing.assert_allclose(violations["upper_position"], 0.6 * violations["hypothesis"] - 2.4)
+    counts = kept.groupby("hypothesis").size()
+    ranking = table_of(usual, "first").set_index("hypothesis")["violating_demonstrations"]
+    assert counts.to_dict() == ranking[ranking > 0].to_dict()
+
+
+def test_each_kind_of_tasks_has_a_first_ranking(points: list[Point]) -> None:
+    settings, results = points[0].settings, points[0].results
+    box = Region((-0.6, -0.2), (0.0, 0.6))  # a mass can pass it on either side
+    plain = dataclasses.replace(settings, truth=TruthSettings("box", (box,), None))
+    tasks = dataclasses.replace(plain.tasks, crossing=True)
+    crossing = dataclasses.replace(plain, tasks=tasks)
+    cold = dataclasses.replace(crossing, temperature=0.5)
+    made = [Point(each, results) for each in (plain, crossing, cold)]
+    for point in made:
+        attempt.run(point, print)
+    kept = [sorted(table_of(point, "trials")["trial"]) for point in made[:2]]
+    assert kept[0] != kept[1]
+    for order in (made, made[::-1]):
+        tables = example_tables(order)
+        parts = [tables[f"first_{name}"] for name in ("ranking", "paths", "violations")]
+        for point, trials, kind in zip(made, kept, (False, True), strict=False):
+            ranking, paths, violations = (part[part["tasks.crossing"] == kind] for part in parts)
+            assert set(ranking["point"]) == {point.identity}
+            assert paths["demonstration"].unique().tolist() == trials[:5]
+            assert set(violations["trial"]) == set(trials[:5])
 
 
 def test_many_truths_have_no_examples(points: list[Point]) -> None:

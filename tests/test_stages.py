@@ -94,8 +94,10 @@ def test_nothing_forbidden_needs_no_safe_set_and_ranks_nothing(tmp_path: Path) -
     ]
     assert tables["attempts"]["outcome"].isin(["kept", "goal_missed"]).all()
     assert tables["ranks"][["rank", "share_top_5"]].isna().all(axis=None)
-    assert not tables["hypotheses"]["covered_by_truth"].any()
+    for name in ("hypotheses", "first"):
+        assert not tables[name][["covered_by_truth", "overlaps_truth"]].any(axis=None)
     trials = tables["trials"]
+    assert trials["truth_probability"].isna().all()
     assert trials["reachable"].equals(trials["feasible"])
     assert trials["final_state_error"].notna().any()
 
