@@ -17,7 +17,7 @@ from experiments.config import read_config, read_recorded_config
 from experiments.places import CONF
 from experiments.planner import quote_options
 from experiments.task import plain_tree
-from paper_figures.__main__ import draw_study
+from paper_figures.drawing import draw_study
 
 run.register_plugins()
 
