@@ -29,7 +29,7 @@ smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
 		$(BIN)/python experiments/run.py -m experiment=$$each scale=smoke study=$$each \
 			results=$(CURDIR)/results/smoke; \
 	done
-	$(BIN)/python -m paper_figures --results results/smoke
+	$(BIN)/python -m paper_figures --results results/smoke $(STUDIES)
 	$(BIN)/python -m paper_report --results results/smoke
 
 test: $(READY) ## run the tests

@@ -1,6 +1,9 @@
 """A real point that takes a tenth of a second, for tests of what is kept of points."""
 
 import dataclasses
+import sys
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from hydra import compose, initialize_config_dir
@@ -26,6 +29,21 @@ TINY = (
     "ranks.subsets=3",
     "rollouts=1",
 )
+
+
+@pytest.fixture(autouse=True)
+def _figures_are_closed() -> Iterator[None]:
+    """What a test draws does not stay open, where anything draws at all."""
+    before = set(_plt().get_fignums()) if _plt() else set()
+    yield
+    if _plt():
+        for number in set(_plt().get_fignums()) - before:
+            _plt().close(number)
+
+
+def _plt() -> Any:
+    """matplotlib.pyplot, if some test has imported it."""
+    return sys.modules.get("matplotlib.pyplot")
 
 
 @pytest.fixture(scope="session")

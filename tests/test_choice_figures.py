@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from types import ModuleType
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -37,13 +35,6 @@ from paper_figures.style import (
 )
 
 MEAN = ["mean", "low", "high"]
-
-
-@pytest.fixture(autouse=True)
-def closed() -> Iterator[None]:
-    """Nothing stays open."""
-    yield
-    plt.close("all")
 
 
 def bars(axes: Axes, label: str) -> np.ndarray:

@@ -17,7 +17,6 @@ from experiments.config import read_config, read_recorded_config
 from experiments.places import CONF
 from experiments.planner import quote_options
 from experiments.task import plain_tree
-from paper_figures.drawing import draw_study
 
 run.register_plugins()
 
@@ -81,9 +80,12 @@ def test_smoke_scale_touches_no_axis_and_no_system() -> None:
 
 
 @pytest.mark.parametrize("experiment", [name for name in OPTIONS if name.startswith("experiment=")])
-def test_every_experiment_runs_small_and_is_drawn(experiment: str, tmp_path: Path) -> None:
+def test_every_experiment_is_valid_and_small_at_smoke_scale(
+    experiment: str, tmp_path: Path
+) -> None:
+    """`make smoke` runs and draws them."""
     script = CONF.parent / "experiments" / "run.py"
-    words = ["-m", experiment, "scale=smoke", f"results={tmp_path}"]
+    words = ["-m", experiment, "scale=smoke", f"results={tmp_path}", "sweep.dry_run=true"]
     done = subprocess.run(
         [sys.executable, str(script), *words], capture_output=True, text=True, timeout=300
     )
@@ -103,7 +105,5 @@ def test_every_experiment_runs_small_and_is_drawn(experiment: str, tmp_path: Pat
             said = told.replace("'", "")
             assert said.startswith(f"{key}: {values[0]} and {values[-1]} stand for all of")
             assert said.endswith(", ".join(values))
-    assert f"{points} points: " in done.stdout
-    drawn = draw_study(tmp_path / "smoke")
-    assert drawn
-    assert all(path.stat().st_size > 1000 for path in drawn)
+    assert f"{points} points: {points} missing" in done.stdout
+    assert points <= 100

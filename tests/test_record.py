@@ -110,7 +110,7 @@ def test_attempt_clears_what_a_killed_one_left(point: Point) -> None:
     attempt.run(point, print)
     assert point.record()["attempt"] == 5
     assert {path.name for path in point.folder.iterdir()} == {
-        *("trials.csv", "ranks.csv", "hypotheses.csv", "summary.csv"),
+        *("trials.csv", "ranks.csv", "hypotheses.csv", "first.csv", "summary.csv"),
         *("sampled.csv", "violations.csv", "moves.csv", "probabilities.csv", "regions.csv"),
         *("attempts.csv", "paths.csv", "dimensions.csv", "log.txt", "record.json", ".lock"),
     }

@@ -23,8 +23,8 @@ from experiments.tables import collate
 from paper_figures.origin import figure_note, write_note
 
 TABLES = (
-    "attempts, dimensions, hypotheses, moves, paths, probabilities, ranks, regions, sampled, "
-    "summary, trials, violations"
+    "attempts, dimensions, first, hypotheses, moves, paths, probabilities, ranks, regions, "
+    "sampled, summary, trials, violations"
 )
 
 
