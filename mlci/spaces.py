@@ -108,9 +108,16 @@ class StateSpace:
         """(n,) period of each dimension, 0 where it does not wrap."""
         return np.where(self.periodic, self.bounds.widths, 0.0)
 
+    @cached_property
+    def _wraps(self) -> bool:
+        """Whether any dimension does."""
+        return bool(np.any(self.periodic))
+
     def wrap(self, states: ArrayLike) -> Floats:
         """states (..., n) with periodic dimensions brought into [lower, upper)."""
         states = np.asarray(states, dtype=float)
+        if not self._wraps:
+            return states
         turns = np.floor((states - self.bounds.lower) / self.bounds.widths)
         wrapped = states - turns * self._period
         # Rounding can leave a state at the seam a hair outside: the seam is `lower`.
@@ -120,6 +127,8 @@ class StateSpace:
     def difference(self, to: ArrayLike, origin: ArrayLike) -> Floats:
         """to - origin (..., n), the short way round: in (-period / 2, period / 2]."""
         step = np.asarray(to, dtype=float) - np.asarray(origin, dtype=float)
+        if not self._wraps:
+            return step
         return step - np.ceil(step / self.bounds.widths - 0.5) * self._period
 
     def unwrap(self, path: ArrayLike) -> Floats:
