@@ -1,4 +1,4 @@
-"""A measure against the time step, a curve a number of cells, with its intervals."""
+"""Means with their intervals: against the time step, a curve a number of cells; or in a line."""
 
 from __future__ import annotations
 
@@ -103,3 +103,17 @@ def shown_facts(rows: pd.DataFrame) -> Iterator[str]:
         "goals, and the mean is over those alone. No mark: it reaches none."
     )
     yield "Marks are moved a little aside of their dt, so that no bar hides another."
+
+
+def draw_dots(axes: Axes, values: pd.DataFrame, y: pd.Series, style: dict[str, str]) -> None:
+    """A mark and an interval for each value."""
+    middle, low, high = (values.iloc[:, column] for column in range(3))
+    axes.errorbar(
+        middle,
+        y,
+        xerr=[(middle - low).clip(lower=0), (high - middle).clip(lower=0)],
+        linestyle="none",
+        markersize=3,
+        elinewidth=0.8,
+        **style,
+    )

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from paper_figures.curves import draw_dots
 from paper_figures.selection import DEFAULT, Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, GUIDE, PAGE, RC, VIOLATED, new_figure
 
@@ -84,7 +84,7 @@ def draw(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame) 
             for number, (label, style, of_series) in enumerate(series):
                 shift = _SPREAD * ((number + 0.5) / len(series) - 0.5)
                 y = of_series["case"].map(names.index) + shift
-                _draw_dots(axes, factor * of_series[_limits(name)], y, {**style, "label": label})
+                draw_dots(axes, factor * of_series[_limits(name)], y, {**style, "label": label})
                 usual = of_series[of_series["case"] == DEFAULT]
                 if len(usual):
                     x = factor * float(usual[name].iloc[0])
@@ -147,17 +147,3 @@ def _series(table: pd.DataFrame) -> list[tuple[str, dict[str, str], pd.DataFrame
         }
         found.append((f"{row.cells} cells, $\\Delta t$ = {row.dt:g} s", style, chosen))
     return found
-
-
-def _draw_dots(axes: Axes, values: pd.DataFrame, y: pd.Series, style: dict[str, str]) -> None:
-    """A mark and an interval for each value."""
-    middle, low, high = (values.iloc[:, column] for column in range(3))
-    axes.errorbar(
-        middle,
-        y,
-        xerr=[(middle - low).clip(lower=0), (high - middle).clip(lower=0)],
-        linestyle="none",
-        markersize=3,
-        elinewidth=0.8,
-        **style,
-    )

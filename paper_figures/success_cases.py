@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from paper_figures.curves import draw_dots
 from paper_figures.selection import DEFAULT, Unsuited, by_tasks, with_cases
 from paper_figures.style import (
     GUIDE,
@@ -70,7 +71,8 @@ def draw(
             for place, (words, rows) in enumerate(kinds):
                 own = rows[rows["demonstrations"] == count]
                 y = own["case"].map(names.index) + _SPREAD * (place - (len(kinds) - 1) / 2)
-                _draw_dots(axes, own, name, y, words)
+                shares = 100 * own[[f"{name}{end}" for end in _ENDS]]
+                draw_dots(axes, shares, y, _style(words))
             for line in range(1, len(names)):
                 axes.axhline(line - 0.5, color=VIOLATED, linewidth=0.6, zorder=0)
             axes.set_yticks(range(len(names)), labels=names if number == 0 else [""] * len(names))
@@ -148,20 +150,6 @@ def _style(words: str) -> dict[str, str]:
     """Colour and mark of a kind of tasks."""
     colour, mark = TASKS.get(words, (OTHER_COLOURS[0], OTHER_MARKS[0]))
     return {"color": colour, "marker": mark}
-
-
-def _draw_dots(axes: Axes, rows: pd.DataFrame, name: str, y: pd.Series, words: str) -> None:
-    """A mark and an interval for each case."""
-    middle, low, high = (100 * rows[name + end] for end in _ENDS)
-    axes.errorbar(
-        middle,
-        y,
-        xerr=[(middle - low).clip(lower=0), (high - middle).clip(lower=0)],
-        linestyle="none",
-        markersize=3,
-        elinewidth=0.8,
-        **_style(words),
-    )
 
 
 def _draw_evidence(axes: Axes, table: pd.DataFrame) -> None:
