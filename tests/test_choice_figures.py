@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -190,8 +191,14 @@ def test_calibration_says_what_is_right() -> None:
         calibration.draw(pd.concat([table, table]))
 
 
-def given(module: ModuleType) -> dict[str, pd.DataFrame]:
-    """The tables that a figure of success needs."""
+TELESCOPE = Path(__file__).parents[1] / "results" / "telescope" / "tables"
+STUDIES = ["known", "telescope"] if (TELESCOPE / "first_ranking.csv").is_file() else ["known"]
+
+
+def given(module: ModuleType, study: str = "known") -> dict[str, pd.DataFrame]:
+    """The tables that a figure of success needs: made up, or those of this repository."""
+    if study == "telescope":
+        return {name: pd.read_csv(TELESCOPE / f"{name}.csv") for name in module.TABLES}
     tables = success_tables()
     return {name: tables[name] for name in module.TABLES}
 
@@ -229,12 +236,14 @@ def wrapped(path: np.ndarray) -> np.ndarray:
     return np.column_stack([path[:, 0] % (2 * np.pi), path[:, 1]])
 
 
-def test_success_curves_are_the_shares_of_the_default_case() -> None:
-    tables = given(success)
+@pytest.mark.parametrize("study", STUDIES)
+def test_success_curves_are_the_shares_of_the_default_case(study: str) -> None:
+    tables = given(success, study)
+    usual = tables["cases"].query("case == 'default'").merge(tables["rank_curve"])
     figure = success.draw(**tables)
     drawn = signs(figure)
     for row, crossing in zip(np.reshape(figure.axes, (2, 3)), KINDS, strict=True):
-        rows = of_default(tables["rank_curve"], crossing)
+        rows = usual[usual["tasks.crossing"] == crossing]
         assert rows["demonstrations"].tolist() == list(range(1, 21))
         for axes, name in zip(row[1:], ("overlap", "inside"), strict=True):
             assert name in axes.get_title(loc="left")
@@ -340,15 +349,17 @@ def test_success_says_the_numbers() -> None:
                     )
 
 
-def test_success_cases_draws_each_case_with_its_interval() -> None:
-    tables = given(success_cases)
+@pytest.mark.parametrize("study", STUDIES)
+def test_success_cases_draws_each_case_with_its_interval(study: str) -> None:
+    tables = given(success_cases, study)
     figure = success_cases.draw(**tables)
     *panels, _ = figure.axes
     shares = [(name, count) for name in ("overlap", "inside") for count in (5, 10)]
     drawn = signs(figure)
     assert list(drawn) == list(KINDS.values())
     names = [text.get_text() for text in panels[0].get_yticklabels()]
-    assert names == list(SUCCESS_CASES)
+    assert names == list(tables["cases"]["case"].drop_duplicates())
+    assert len(names) == len(SUCCESS_CASES) or study == "telescope"
     rows = tables["cases"].merge(tables["rank_curve"])
     for axes, (name, count) in zip(panels, shares, strict=True):
         assert axes.get_title().split() == [f"{name},", str(count), "shown"]
