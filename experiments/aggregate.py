@@ -14,8 +14,9 @@ choice of the subsets, and tells nothing of other demonstrations. With S seeds t
 them comes out too small by (S - 1) / S. The pooled violation distance is the mean of what each
 demonstration adds to it (`mlci.metrics.ViolationDistance`), and is resampled as such a mean.
 
-Every row of these tables has a random stream of its own, derived from its key, and orders what it
-draws from: no row depends on another, nor on the order of the points' rows.
+Every group of `measures`, and every number of demonstrations of a group in `rank_curve`, has a
+random stream of its own, derived from its key, and orders what it draws from: none depends on
+another, nor on the order of the points' rows.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ import pandas as pd
 from mlci.spaces import Floats, Ints
 
 _RESAMPLES = 1000
+_DRAWS_AT_ONCE = 1 << 16  # that stay in the cache
 TAILS = (0.025, 0.975)  # of a 95 % interval
 
 
@@ -60,17 +62,14 @@ def measures(trials: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     for opening, group in _groups(trials, ["trial"]):
-        seeds = _sizes(group)
-        for name in _columns_after(group, "trial"):
-            values = group[[name]].to_numpy(dtype=float)
-            (mean,), (low,), (high,) = _mean_and_limits(
-                values, resamples(seeds, [*opening.values(), name])
-            )
-            there = int(np.sum(~np.isnan(values)))
-            limits = {"mean": mean, "low": low, "high": high}
-            rows.append(
-                {**opening, "measure": name, **limits, "seeds": len(seeds), "demonstrations": there}
-            )
+        seeds, names = _sizes(group), _columns_after(group, "trial")
+        values = group[names].to_numpy(dtype=float)
+        there = np.sum(~np.isnan(values), axis=0)
+        found = _mean_and_limits(values, resamples(seeds, list(opening.values())))
+        for name, count, *limits in zip(names, there, *found, strict=True):
+            row = {**opening, "measure": name}
+            row |= dict(zip(("mean", "low", "high"), limits, strict=True))
+            rows.append({**row, "seeds": len(seeds), "demonstrations": int(count)})
     return pd.DataFrame(rows)
 
 
@@ -119,12 +118,19 @@ def resamples(sizes: Ints, key: Sequence[str]) -> Ints:
     rng = np.random.default_rng(state)
     first = np.concatenate([[0], np.cumsum(sizes)])
     seed = rng.integers(0, len(sizes), (_RESAMPLES, len(sizes)))
-    drawn_size = sizes[seed][..., None]
-    place = (rng.random((*seed.shape, sizes.max()), dtype=np.float32) * drawn_size).astype(np.intp)
-    row = np.arange(_RESAMPLES)[:, None, None] * first[-1] + first[seed][..., None] + place
-    # A seed with fewer rows than the largest takes as many of the draws as it has rows.
-    row = row[np.broadcast_to(np.arange(sizes.max()) < drawn_size, row.shape)]
-    return np.bincount(row, minlength=_RESAMPLES * first[-1]).reshape(_RESAMPLES, first[-1])
+    counts = np.empty((_RESAMPLES, first[-1]), dtype=np.intp)
+    at_once = max(1, _DRAWS_AT_ONCE // int(len(sizes) * sizes.max()))
+    for begin in range(0, _RESAMPLES, at_once):
+        drawn = seed[begin : begin + at_once]
+        size = sizes[drawn][..., None]
+        share = rng.random((*drawn.shape, sizes.max()), dtype=np.float32)
+        row = np.arange(len(drawn))[:, None, None] * first[-1] + first[drawn][..., None]
+        row = row + (share * size).astype(np.intp)
+        # A seed with fewer rows than the largest takes as many of the draws as it has rows.
+        row = row[np.broadcast_to(np.arange(sizes.max()) < size, row.shape)]
+        total = np.bincount(row, minlength=len(drawn) * first[-1])
+        counts[begin : begin + at_once] = total.reshape(len(drawn), first[-1])
+    return counts
 
 
 def _read(path: Path) -> pd.DataFrame:

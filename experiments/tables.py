@@ -214,11 +214,14 @@ def _extra_columns(
         tuple(opening_columns(measure, group[0].settings).values()) for group in groups
     ]
     extra = []
+    several = [group for group in groups if len(group) > 1]
     # A key that varies inside a group is no reason for its rows, unless there is no other.
-    for key in sorted(keys, key=lambda key: any(varies(key, group) for group in groups)):
+    for key in sorted(keys, key=lambda key: any(varies(key, group) for group in several)):
         told: dict[tuple[Any, ...], list[Point]] = {}
         for values, group in zip(known, groups, strict=True):
             told.setdefault(values, []).append(group[0])
+        if len(told) == len(groups):
+            break
         if any(varies(key, alike) for alike in told.values()):
             extra.append(key)
             known = [
