@@ -42,9 +42,6 @@ class Planner(Sweeper):
         cases: lists of overrides that go together, such as [actions=9, seed=1]; [] changes nothing.
             Where one of them has several values, so has the case.
         ends: of several values take the first and the last only, and say so.
-
-    Raises:
-        ValueError: cases that are not lists of overrides.
     """
 
     def __init__(
@@ -54,7 +51,7 @@ class Planner(Sweeper):
         ends: bool = False,
     ) -> None:
         self.params, self.ends = dict(params or {}), ends
-        self.cases = _read_cases(cases or [[]])
+        self.cases = cases or [[]]  # what is wrong with them is told when they are read
 
     def setup(
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
@@ -99,6 +96,7 @@ class Planner(Sweeper):
 
     def _jobs(self, arguments: list[str]) -> list[list[str]]:
         """The overrides of every point; the command line wins over the experiment's own."""
+        self.cases = _read_cases(self.cases)
         parser = OverridesParser.create(config_loader=self._loader)
         typed = parser.parse_overrides(arguments)
         given = {override.key_or_group for override in typed}
@@ -197,14 +195,19 @@ def _values(override: Override) -> list[str]:
 
 
 def _read_cases(cases: object) -> list[list[str]]:
-    """The words of each case, as they were written."""
+    """The words of each case, as they were written.
+
+    Raises:
+        ConfigError: cases that are not lists of overrides.
+    """
     plain = OmegaConf.to_container(cases) if OmegaConf.is_config(cases) else cases
     if not isinstance(plain, list):
-        raise ValueError(f"cases: {plain!r} is no list of lists of overrides")
+        raise ConfigError(f"hydra.sweeper: cases: {plain!r} is no list of lists of overrides")
     for i, case in enumerate(plain):
         if not (isinstance(case, list) and all(isinstance(word, str) for word in case)):
-            raise ValueError(
-                f"cases[{i}]: {case!r} is no list of overrides, such as [dt=0.5, seed=1]"
+            raise ConfigError(
+                f"hydra.sweeper: cases[{i}]: {case!r} is no list of overrides, such as "
+                "[dt=0.5, seed=1]"
             )
     return plain
 
