@@ -68,8 +68,11 @@ class PreparedInference:
         if np.any((shown < 0) | (shown >= len(self.phi))):
             raise ValueError(f"tasks are numbered 0 to {len(self.phi) - 1}, not {shown.tolist()}")
         violated = np.zeros((len(paths), len(self.hypotheses)), dtype=bool)
-        for row, path in zip(violated, paths, strict=True):
-            row[:] = self.hypotheses.violated_by(path)
+        if len({np.shape(path) for path in paths}) == 1:  # all at once is quicker
+            violated[:] = self.hypotheses.violated_by(np.stack(paths))
+        else:
+            for row, path in zip(violated, paths, strict=True):
+                row[:] = self.hypotheses.violated_by(path)
         return rank_constraints(self.phi[shown], violated, prior_none)
 
 

@@ -44,10 +44,14 @@ def shown(task: int, seed: int) -> Floats:
     return rollout(SYSTEM, start, rng.uniform(-0.6, 0.6, (500, 1)), 0.01)
 
 
-def test_ranking_online_is_ranking_at_once(mdp: TabularMDP, prepared: PreparedInference) -> None:
-    """Tasks shown twice, never, and one whose goal cannot be reached."""
+@pytest.mark.parametrize("last", [501, 300])
+def test_ranking_online_is_ranking_at_once(
+    mdp: TabularMDP, prepared: PreparedInference, last: int
+) -> None:
+    """Tasks shown twice, never, and one whose goal cannot be reached; paths of one length or not."""
     tasks = [2, 0, 2, 3]
     paths = [shown(task, seed) for seed, task in enumerate(tasks)]
+    paths[-1] = paths[-1][:last]
     assert prepared.reachable.tolist() == [True, True, True, False]
     phi = []
     for task in (2, 0, 2):
