@@ -48,7 +48,7 @@ def shown(task: int, seed: int) -> Floats:
 def test_ranking_online_is_ranking_at_once(
     mdp: TabularMDP, prepared: PreparedInference, last: int
 ) -> None:
-    """Tasks shown twice, never, and one whose goal cannot be reached; paths of one length or not."""
+    """Tasks shown twice, never, one whose goal cannot be reached; paths of one length or not."""
     tasks = [2, 0, 2, 3]
     paths = [shown(task, seed) for seed, task in enumerate(tasks)]
     paths[-1] = paths[-1][:last]
