@@ -21,7 +21,7 @@ figures: $(READY) ## draw all figures and write the report again, from the table
 	@$(MAKE) --no-print-directory report
 
 report: $(READY) ## write results/paper/REPORT.md and .html, and the numbers in README.md
-	$(BIN)/python -m paper_report
+	$(BIN)/python -m paper_figures.report
 
 smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
 	@set -e; for each in $(STUDIES); do \
@@ -30,7 +30,7 @@ smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
 			results=$(CURDIR)/results/smoke; \
 	done
 	$(BIN)/python -m paper_figures --results results/smoke $(STUDIES)
-	$(BIN)/python -m paper_report --results results/smoke
+	$(BIN)/python -m paper_figures.report --results results/smoke
 
 test: $(READY) ## run the tests
 	$(BIN)/python -m pytest

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 
 if __name__ == "__main__":  # before all that takes time to import
-    from experiments import commands
+    from experiments import app
 
-    sys.exit(commands.advise())
+    sys.exit(app.advise())
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -16,19 +16,18 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
-from experiments.config import ConfigError, read_advice_config
+from experiments.app import DONE, FAILED, run_command
+from experiments.config.read import ConfigError, read_advice_config
+from experiments.config.settings import AdviceSettings
 from experiments.console import table_lines, words
-from experiments.foreground import run_command
-from experiments.run import DONE, FAILED
-from experiments.settings import AdviceSettings
 from mlci.demonstrations import Task
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.maxent import log_partition, reachable, violation_probabilities
-from mlci.mdp import action_grid, discretize
 from mlci.metrics import MOST_UNREACHABLE, Diagnosis, diagnose
 from mlci.simulate import step_count
 from mlci.spaces import Bools, Floats
+from mlci.tabular import action_grid, discretize
 
 _SAMPLES = 100  # of the paths that show which tasks can be done
 # A remedy that takes more moves is not tried: some 30 s and 1 GB.

@@ -113,3 +113,10 @@ def _cell(value: object) -> str:
     if value is None:
         return "-"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def job_names(jobs: Sequence[Sequence[str]]) -> list[str]:
+    """What tells each job from the others, as a person would type it."""
+    shared = set(jobs[0]).intersection(*jobs) if len(jobs) > 1 else set()
+    names = [" ".join(part for part in job if part not in shared) for job in jobs]
+    return [name.replace("'", "") or "defaults" for name in names]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 
 if __name__ == "__main__":  # before all that takes time to import
-    from experiments import commands
+    from experiments import app
 
-    sys.exit(commands.infer())
+    sys.exit(app.infer())
 
 import json
 from collections.abc import Sequence
@@ -17,23 +17,21 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from experiments.config import ConfigError, read_recorded_config
+from experiments.app import DONE, FAILED, run_command
+from experiments.config.paths import results_folder
+from experiments.config.read import ConfigError, read_recorded_config
+from experiments.config.settings import RecordedSettings
 from experiments.console import diagnosis_lines, ranking_lines
-from experiments.foreground import run_command
-from experiments.measures import dimension_table, ranking_table
-from experiments.run import DONE, FAILED
-from experiments.schema import plain
-from experiments.settings import RecordedSettings
-from experiments.store import canonical_json, digest, replace_file
-from experiments.surroundings import surroundings
-from experiments.tables import csv_bytes
-from experiments.task import results_folder
+from experiments.point.tables import dimension_table, ranking_table
+from experiments.tracking.environment import surroundings
+from experiments.tracking.files import csv_bytes, digest, replace_file
+from experiments.tracking.trees import canonical_json, plain
 from mlci.demonstrations import Demonstration
 from mlci.maxent import expected_violations
-from mlci.mdp import action_grid, discretize
 from mlci.metrics import diagnose
-from mlci.recordings import Problem, read_demonstrations
+from mlci.recordings.read import Problem, read_demonstrations
 from mlci.spaces import Bools
+from mlci.tabular import action_grid, discretize
 from paper_figures import hypothesis_map
 from paper_figures.style import save
 

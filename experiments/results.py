@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 
 if __name__ == "__main__":  # before all that takes time to import
-    from experiments import commands
+    from experiments import app
 
-    sys.exit(commands.results())
+    sys.exit(app.results())
 
 import argparse
 import os
@@ -16,15 +16,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from experiments.archive import Archive, ArchiveError, KeptPoint, select
-from experiments.cleaning import leftovers
-from experiments.export import file_bytes, tidy_table
-from experiments.freshness import point_concerns
-from experiments.places import default_results
-from experiments.record import State
-from experiments.store import replace_file
-from experiments.study import Study
-from experiments.views import (
+from experiments.config.paths import default_results
+from experiments.lookback.archive import Archive, ArchiveError, KeptPoint, select
+from experiments.lookback.cleaning import leftovers
+from experiments.lookback.export import file_bytes, tidy_table
+from experiments.lookback.freshness import point_concerns
+from experiments.lookback.views import (
     differences,
     point_facts,
     point_list,
@@ -33,6 +30,9 @@ from experiments.views import (
     study_status,
     summary_list,
 )
+from experiments.tracking.files import replace_file
+from experiments.tracking.points import State
+from experiments.tracking.study import Study
 
 
 def main() -> int:

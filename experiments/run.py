@@ -5,35 +5,27 @@ from __future__ import annotations
 import sys
 
 if __name__ == "__main__":  # before all that takes time to import
-    from experiments import commands
+    from experiments import app
 
-    sys.exit(commands.run())
+    sys.exit(app.run())
 
 import os
 import signal
 import traceback
-from functools import cache
 
 import hydra
-from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
-from hydra.core.plugins import Plugins
 from omegaconf import DictConfig
 
-from experiments.config import ConfigError
-from experiments.dask_engine import DaskLauncher
-from experiments.errors import explain, of_config
-from experiments.launcher import PoolLauncher
-from experiments.own_folder import command_words
-from experiments.places import CONF
-from experiments.planner import Planner, SweepFailed
-from experiments.slurm import SlurmLauncher
-from experiments.tables import CollateError
-from experiments.task import run_once
-
-DONE, FAILED, REFUSED, STOPPED = 0, 1, 2, 130
-# Hydra 1.3 warns where this is left out, and 1.4 where it is given.
-VERSION_BASE = {"version_base": "1.3"} if hydra.__version__.startswith("1.3.") else {}
+from experiments.app import DONE, FAILED, REFUSED, STOPPED, version_base
+from experiments.collate.join import CollateError
+from experiments.config.command_line import command_words
+from experiments.config.explain import explain, of_config
+from experiments.config.paths import CONF
+from experiments.config.read import ConfigError
+from experiments.sweep.planner import SweepFailed
+from experiments.sweep.plugins import register_plugins
+from experiments.sweep.worker import run_once
 
 
 def main() -> int:
@@ -47,7 +39,7 @@ def main() -> int:
     register_plugins()
     try:
         sys.argv[1:] = command_words(sys.argv[1:])
-        hydra.main(config_path=str(CONF), config_name="config", **VERSION_BASE)(_run_once)()
+        hydra.main(config_path=str(CONF), config_name="config", **version_base())(_run_once)()
     except KeyboardInterrupt:
         print("stopped; what has finished is kept: the same command runs the rest", file=sys.stderr)
         return STOPPED
@@ -62,51 +54,6 @@ def main() -> int:
         print(explain(error), file=sys.stderr)
         return REFUSED
     return DONE
-
-
-_SLURM = {
-    "jobs": 100,  # of the array; the points are dealt to them
-    "poll": 2.0,  # [s] between looks at the queue
-    "fail_fast": "${sweep.fail_fast}",
-    # What each job asks for; null leaves it to the cluster.
-    "partition": None,
-    "timeout_min": 60,
-    "cpus_per_task": 1,  # and as many points at once
-    "mem_gb": None,
-    "array_parallelism": 256,  # jobs that run at the same time
-    "setup": None,  # shell commands before, as a list
-    "additional_parameters": None,  # more of sbatch's options: {account: mine}
-}
-
-
-_DASK = {
-    "jobs": 100,  # the points are dealt to them
-    "scheduler": None,  # address of a running cluster; null starts one in this process
-    "threads": "${workers}",  # of the cluster in this process
-    "fail_fast": "${sweep.fail_fast}",
-}
-
-
-@cache  # Hydra 1.4 wants them once
-def register_plugins() -> None:
-    """Make the sweeper and the launcher known to Hydra, however the project is installed."""
-    # Hydra 1.3 accepts plugins of the package `hydra_plugins` only; 1.4 has no such rule.
-    Plugins.is_in_toplevel_plugins_module = staticmethod(lambda target: True)  # type: ignore[assignment, method-assign]
-    for group, name, plugin, settings in (
-        ("hydra/sweeper", "planner", Planner, {"params": None, "cases": None, "ends": False}),
-        (
-            "hydra/launcher",
-            "pool",
-            PoolLauncher,
-            {"workers": "${workers}", "fail_fast": "${sweep.fail_fast}"},
-        ),
-        ("hydra/launcher", "slurm", SlurmLauncher, _SLURM),
-        ("hydra/launcher", "dask", DaskLauncher, _DASK),
-    ):
-        Plugins.instance().register(plugin)
-        target = f"{plugin.__module__}.{plugin.__name__}"
-        node = {"_target_": target, **settings}
-        ConfigStore.instance().store(group=group, name=name, node=node, provider="mlci")
 
 
 def _run_once(config: DictConfig) -> None:

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from mlci.constraints import ConstraintSet
 from mlci.demonstrations import REACHED, Demonstration, Task
 from mlci.ilqr import ControlFilter, optimize
 from mlci.reachability import SafeSet
+from mlci.regions import ConstraintSet
 from mlci.simulate import rollout, step_count
 from mlci.spaces import Bools, Box, Floats
 from mlci.systems import System

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from mlci.mdp import Progress, TabularMDP
 from mlci.spaces import Bools, Floats, Ints
+from mlci.tabular import Progress, TabularMDP
 
 _CELLS_AT_ONCE = 1 << 12  # whose moves a step of work holds
 PHI_BYTES = 1 << 29  # of violation probabilities held at once, else regions go block by block

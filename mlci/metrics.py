@@ -11,9 +11,9 @@ from scipy.special import comb
 
 from mlci.grids import Grid
 from mlci.inference import log_likelihood_gain, rank_scores
-from mlci.mdp import TabularMDP
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 from mlci.systems import System
+from mlci.tabular import TabularMDP
 
 # A discretisation is questioned above these shares. In the paper's sweep of the pendulum the truth
 # is among the first 5 of most sets of 9 demonstrations where hardly a goal is out of reach, and of

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.constraints import ConstraintSet
 from mlci.inference import Ranking, rank_constraints
 from mlci.maxent import expected_violations
-from mlci.mdp import Progress, TabularMDP
+from mlci.regions import ConstraintSet
 from mlci.spaces import Bools, Floats
+from mlci.tabular import Progress, TabularMDP
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.constraints import ConstraintSet
 from mlci.grids import Grid
+from mlci.regions import ConstraintSet
 from mlci.spaces import Bools, Floats
 from mlci.systems import System
 

@@ -18,7 +18,7 @@ class System(ABC):
     """What the rest of the package needs to know about a system.
 
     `control_box` is the range that the tabular actions and the safety control use. The
-    demonstrator is free to exceed it. `mlci.soundness.check_system` tells what is wrong with one.
+    demonstrator is free to exceed it. `check_system` tells what is wrong with one.
     """
 
     @property

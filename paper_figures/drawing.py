@@ -9,8 +9,8 @@ from types import ModuleType
 
 import pandas as pd
 
+from paper_figures import calibration_diagram as calibration
 from paper_figures import (
-    calibration,
     final_state_error,
     hypothesis_map,
     in_cell,
@@ -24,7 +24,7 @@ from paper_figures import (
     trajectories,
     violation_distance,
 )
-from paper_figures.origin import figure_note, read_note, sentence, write_note
+from paper_figures.figure_notes import figure_note, read_note, sentence, write_note
 from paper_figures.selection import Unsuited
 from paper_figures.style import save
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from hydra import compose, initialize_config_dir
 
-from experiments import run
-from experiments.config import read_config
-from experiments.places import CONF
-from experiments.settings import Settings
-from experiments.task import plain_tree
+from experiments.app import version_base
+from experiments.config.paths import CONF
+from experiments.config.read import plain_tree, read_config
+from experiments.config.settings import Settings
+from experiments.sweep.plugins import register_plugins
 
 
 def composed(*words: str) -> Settings:
     """The settings of one point."""
-    run.register_plugins()
-    with initialize_config_dir(str(CONF), **run.VERSION_BASE):
+    register_plugins()
+    with initialize_config_dir(str(CONF), **version_base()):
         return read_config(plain_tree(compose("config", list(words))))[0]
 
 

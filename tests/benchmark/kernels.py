@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.settings import Settings
-from mlci.constraints import ConstraintSet
+from experiments.config.settings import Settings
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.inference import rank_constraints
 from mlci.maxent import expected_violations, log_partition, violation_probabilities
-from mlci.mdp import TabularMDP, action_grid, discretize, substep_count
 from mlci.online import prepare
 from mlci.reachability import solve
+from mlci.regions import ConstraintSet
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import rk4_step, step_count
 from mlci.spaces import Box, Floats, Ints
 from mlci.systems import Pendulum, System
+from mlci.tabular import TabularMDP, action_grid, discretize, substep_count
 from tests.benchmark.timing import Row, copy_rate, median_seconds
 
 _BLOCK = 1 << 14  # moves, whose states stay in the cache

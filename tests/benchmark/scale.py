@@ -18,15 +18,15 @@ from functools import cached_property
 import numpy as np
 from tqdm import tqdm
 
-from experiments.surroundings import peak_memory
-from mlci.constraints import ConstraintSet
+from experiments.tracking.environment import peak_memory
 from mlci.grids import Grid
 from mlci.inference import rank_constraints
 from mlci.maxent import log_partition, violation_probabilities
-from mlci.mdp import action_grid, discretize
+from mlci.regions import ConstraintSet
 from mlci.simulate import step_count
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import System
+from mlci.tabular import action_grid, discretize
 from tests.benchmark.configs import telescope
 from tests.benchmark.kernels import step_floor
 

@@ -7,8 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from experiments.record import Point
-from experiments.tables import collate
+from experiments.collate.join import collate
+from experiments.tracking.points import Point
 from tests.benchmark.configs import composed
 from tests.benchmark.timing import ROOT, Cost, Row, median_seconds
 

@@ -19,7 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from experiments import infer, run
-from experiments.places import CONF
+from experiments.config.paths import CONF
+from experiments.sweep.plugins import register_plugins
 
 SCREEN = 24  # lines
 SUBPROCESSES = 16  # cases that are also run as commands of their own
@@ -302,7 +303,7 @@ def main(seed: int = 0) -> int:
     start, wrong = time.perf_counter(), 0
     spawnable = [i for i, case in enumerate(every) if "\x00" not in "".join(case.arguments)]
     separate = set(random_.sample(spawnable, SUBPROCESSES))
-    run.register_plugins()
+    register_plugins()
     for i, case in enumerate(every):
         with tempfile.TemporaryDirectory() as folder:
             problem = attempt(case, Path(folder), separate=i in separate)

@@ -22,22 +22,23 @@ from filelock import FileLock
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from hydra import compose, initialize_config_dir
-from test_sweep import faulty, gone, running, start, tables
+from sweeps import faulty, gone, running, start, tables
 
-import experiments.point
-from experiments import attempt, run
-from experiments.config import read_config
-from experiments.places import CONF
-from experiments.record import Point
-from experiments.store import Store
-from experiments.tables import collate
-from experiments.task import plain_tree
+import experiments.point.run
+from experiments.app import version_base
+from experiments.collate.join import collate
+from experiments.config.paths import CONF
+from experiments.config.read import plain_tree, read_config
+from experiments.sweep import attempts as attempt
+from experiments.sweep.plugins import register_plugins
+from experiments.tracking.points import Point
+from experiments.tracking.store import Store
 
 KILLS = 20
 SEED = 2026
 # In each worker: whoever finishes a point says so, in a file that is only ever appended to.
 COUNTING = """
-from experiments import attempt as _attempt
+from experiments.sweep import attempts as _attempt
 
 def _counted(point, *arguments, _keep=_attempt._keep_result):
     _keep(point, *arguments)
@@ -206,11 +207,13 @@ def overhead(base: Path, limit: float = 0.5) -> None:
 
 def collating(base: Path, limit: float = 5.0) -> None:
     """Collating 2000 points, with tables of a tiny point."""
-    run.register_plugins()
-    with initialize_config_dir(str(CONF), **run.VERSION_BASE):
+    register_plugins()
+    with initialize_config_dir(str(CONF), **version_base()):
         settings = read_config(plain_tree(compose("config", ["scale=smoke"])))[0]
-    tables_of_one = experiments.point.run_point(settings, Store(base / "store"), lambda line: None)
-    experiments.point.run_point = lambda *_: tables_of_one
+    tables_of_one = experiments.point.run.run_point(
+        settings, Store(base / "store"), lambda line: None
+    )
+    experiments.point.run.run_point = lambda *_: tables_of_one
     points = [
         Point(dataclasses.replace(settings, seed=seed), base / "collated") for seed in range(2000)
     ]

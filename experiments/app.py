@@ -1,0 +1,120 @@
+"""How a command starts and ends: signals, the config from the command line, exit codes.
+
+What a command does is imported late, so that Ctrl-C ends it quietly from the start.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+DONE, FAILED, REFUSED, STOPPED = 0, 1, 2, 130
+
+
+def run() -> int:
+    """`mlci-run`: experiments/run.py."""
+    return _start("experiments.run")
+
+
+def infer() -> int:
+    """`mlci-infer`: experiments/infer.py."""
+    return _start("experiments.infer")
+
+
+def advise() -> int:
+    """`mlci-advise`: experiments/advise.py."""
+    return _start("experiments.advise")
+
+
+def results() -> int:
+    """`mlci-results`: experiments/results.py."""
+    return _start("experiments.results")
+
+
+def figures() -> int:
+    """`mlci-figures`: paper_figures."""
+    return _start("paper_figures.__main__")
+
+
+def report() -> int:
+    """`mlci-report`: paper_figures.report."""
+    return _start("paper_figures.report.__main__")
+
+
+def version_base() -> dict[str, str]:
+    """The argument of that name for Hydra: 1.3 warns if it is left out, 1.4 if it is given."""
+    import hydra
+
+    return {"version_base": "1.3"} if hydra.__version__.startswith("1.3.") else {}
+
+
+def run_command(config_name: str, act: Callable[[dict[str, Any]], int]) -> int:
+    """Compose a config from the command line, and act on it.
+
+    Args:
+        config_name: a file of conf/.
+        act: takes the resolved config and returns the exit status.
+
+    Returns:
+        that status; 2 if the config is wrong, 130 after Ctrl-C.
+    """
+    import hydra
+    from omegaconf import DictConfig
+
+    from experiments.config.command_line import command_words
+    from experiments.config.explain import explain
+    from experiments.config.paths import CONF
+    from experiments.config.read import ConfigError, plain_tree
+
+    def task(config: DictConfig) -> None:
+        """The work, outside Hydra's own handling of errors."""
+        try:
+            status = act(plain_tree(config))
+        except ConfigError as error:
+            print(error, file=sys.stderr)
+            raise SystemExit(REFUSED) from None
+        if status != DONE:
+            raise SystemExit(status)
+
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises its errors, and they are worded here
+    try:
+        sys.argv[1:] = command_words(sys.argv[1:])
+        hydra.main(config_path=str(CONF), config_name=config_name, **version_base())(task)()
+    except KeyboardInterrupt:
+        return STOPPED
+    except Exception as error:
+        print(explain(error), file=sys.stderr)
+        return REFUSED
+    return DONE
+
+
+def _start(module: str) -> int:
+    """Import a module, which takes a second, and run its `main`; returns the exit status.
+
+    Modules of the current folder can be imported by name, such as those of a user's own system.
+    """
+    # After all others, so that it hides none of them; workers get the same. Python itself adds the
+    # folder of the file that it was given, where a module of ours could be taken for a user's.
+    ours = os.path.dirname(os.path.abspath(__file__))
+    sys.path[:] = [path for path in sys.path if os.path.abspath(path) != ours] + [os.getcwd()]
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is not signal.SIG_IGN:  # as in the background of a script
+        signal.signal(signal.SIGINT, _leave)
+    main = import_module(module).main
+    try:
+        signal.signal(signal.SIGINT, usual)
+        status: int = main()
+    except KeyboardInterrupt:
+        status = STOPPED
+    if usual is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _leave)  # while the interpreter ends
+    return status
+
+
+def _leave(*_: Any) -> None:
+    """End without a word, as nothing has begun, or all is done; an exception might be caught."""
+    os._exit(STOPPED)

@@ -1,0 +1,1 @@
+"""A study's tables, from those of its points."""

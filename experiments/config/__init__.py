@@ -1,0 +1,1 @@
+"""What a config says, checked: settings, checks across fields, paths."""

@@ -1,0 +1,42 @@
+"""How much memory a point takes at most, told before anything is computed."""
+
+from __future__ import annotations
+
+import math
+import os
+
+from experiments.config.settings import ModelSettings, Settings
+from mlci.maxent import PHI_BYTES
+
+# Measured on points of 0.4 to 4 million moves, and `python -m tests.benchmark` compares: a move has
+# successor, reward, its place among the cell's successors and the regions that it crosses, and most
+# of these twice while what is read from the store is joined.
+_BYTES_A_MOVE = 100
+_BYTES_A_STEP = 16  # and cell: log Z, and which cells can be occupied
+_BYTES_A_HYPOTHESIS = 30_000  # while crossings are found
+_BYTES_AT_REST = 200_000_000  # the interpreter, its packages, and blocks of work
+
+
+def expected_memory(settings: ModelSettings) -> float:
+    """Bytes that a point takes at most for its tabular model and the inference."""
+    cells = math.prod(settings.grid.shape)
+    dimensions = settings.model.space.dimension
+    moves = math.prod(settings.action_counts) * settings.transition.samples**dimensions
+    hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
+    hypotheses += len(settings.hypotheses.boxes)
+    steps = settings.horizon / settings.dt if isinstance(settings, Settings) else 0
+    return (
+        float(cells) * moves * _BYTES_A_MOVE
+        + float(cells) * steps * _BYTES_A_STEP
+        + float(hypotheses) * _BYTES_A_HYPOTHESIS
+        + min(PHI_BYTES, float(cells) * hypotheses * 16)
+        + _BYTES_AT_REST
+    )
+
+
+def machine_memory() -> float:
+    """Bytes of this machine's memory; infinite where the system does not tell."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (ValueError, OSError, AttributeError):
+        return math.inf

@@ -1,0 +1,51 @@
+"""Whether the tables and figures of a study are those of its points, and if not, why."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from experiments.lookback.archive import KeptPoint, count_states
+from experiments.tracking.points import State
+from experiments.tracking.study import Study
+from paper_figures import figure_notes as origin
+
+
+def point_concerns(points: Sequence[KeptPoint]) -> list[str]:
+    """How many of a study's points are not done."""
+    counts = count_states(points)
+    return [
+        f"{counts[state]} point{'s are' if counts[state] > 1 else ' is'} {state}"
+        for state in (State.STALE, State.FAILED, State.RUNNING, State.MISSING)
+        if counts[state]
+    ]
+
+
+def table_concerns(study: Study, points: Sequence[KeptPoint]) -> list[str]:
+    """Why the tables of a study are not up to date; empty if they are."""
+    collated = study.collated
+    if collated is None:
+        return ["not written yet", *point_concerns(points)]
+    found = []
+    for name, digest in collated.tables.items():
+        path = study.folder / "tables" / name
+        if not path.exists():
+            found.append(f"table {name} is missing")
+        elif origin.table_digest(path.read_bytes()) != digest:
+            found.append(f"table {name} was changed after it was written")
+    if set(collated.points) != set(study.points):
+        found.append("they hold other points than the study's last sweep")
+    elif all(point.content for point in points):
+        sources = Counter(point.content["source"] for point in points)
+        latest = max(point.content["started"] for point in points)
+        if sources != collated.sources or latest > collated.started[1]:
+            found.append("points have run again since")
+    if len(collated.sources) > 1:
+        found.append(f"they mix {len(collated.sources)} versions of the source")
+    return found + point_concerns(points)
+
+
+def figure_concerns(study: Study, points: Sequence[KeptPoint]) -> dict[str, list[str]]:
+    """Why each figure of a study is not up to date, by its name; empty for one that is."""
+    shared = point_concerns(points)
+    return {name: own + shared for name, own in origin.concerns(study.folder).items()}

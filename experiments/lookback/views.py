@@ -1,0 +1,216 @@
+"""What a person reads of studies and points: lists, states, and all about one or two of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from experiments.console import job_names, table_lines
+from experiments.lookback.archive import Archive, KeptPoint, count_states, varying
+from experiments.lookback.freshness import figure_concerns, table_concerns
+from experiments.tracking.points import State
+from experiments.tracking.study import Study
+from experiments.tracking.trees import flatten
+
+_SHORT = 12  # characters of an identity that are shown; any that are enough can be typed
+_COLUMNS = ("truth", "cells", "actions", "dt", "samples", "seed")
+
+
+def study_list(archive: Archive, width: int | None) -> Iterator[str]:
+    """A line for each study, and one for the points in none."""
+    yield from archive.unreadable
+    rows: list[list[object]] = [["study", "points", *State, "tables"]]
+    for study in archive.studies.values():
+        counts = count_states(archive.points_of(study))
+        tables = len(study.collated.tables) if study.collated else 0
+        rows.append([study.name, len(study.points), *(counts[s] for s in State), tables])
+    planned = {point for study in archive.studies.values() for point in study.points}
+    alone = [point for name, point in archive.points.items() if name not in planned]
+    if alone:
+        counts = count_states(alone)
+        rows.append(["(no study)", len(alone), *(counts[s] for s in State), None])
+    yield from table_lines(rows, width) if len(rows) > 1 else [f"no study in {archive.results}"]
+
+
+def point_list(
+    archive: Archive, study: Study | None, states: Sequence[State], width: int | None
+) -> Iterator[str]:
+    """A line for each point of a study, or of all; `states` keeps some of them."""
+    if study is None:
+        members: dict[str, list[str]] = {name: [] for name in archive.points}
+        for each in archive.studies.values():
+            for name in each.points:
+                members.setdefault(name, []).append(each.name)
+        points = [archive.points.get(n) or KeptPoint(archive.results, n) for n in members]
+        names = [", ".join(members[point.identity]) or "(no study)" for point in points]
+    else:
+        points = archive.points_of(study)
+        names = job_names(list(study.points.values())) if study.points else []
+    columns = _COLUMNS if study is None else ()
+    which = "study" if study is None else "which"
+    rows: list[list[object]] = [["point", "state", *columns, which, "seconds", "started"]]
+    for point, name in zip(points, names, strict=True):
+        if not states or point.known_state in states:
+            seconds = point.content.get("seconds", {}).get("total")
+            started = str(point.content.get("started", ""))[:19]
+            values = [point.summary.get(column) for column in columns]
+            identity, state = point.identity[:_SHORT], point.known_state
+            rows.append([identity, state, *values, name, seconds, started])
+    yield from _without_empty(rows, width)
+
+
+def summary_list(points: Sequence[KeptPoint], width: int | None) -> Iterator[str]:
+    """A line for each finished point: what its config has of its own, and its summary."""
+    # The summary opens with columns that say the same as these keys.
+    said = ("truth.", "dt", "actions", "grid.shape", "transition.samples", "seed")
+    extra = [key for key in varying(points) if not key.startswith(said)]
+    facts: list[dict[str, object]] = [
+        {
+            "state": str(point.known_state),
+            **{key: point.config.get(key) for key in extra},
+            **{key: _rounded(value) for key, value in point.summary.items()},
+        }
+        for point in points
+    ]
+    keys = dict.fromkeys(key for each in facts for key in each)
+    common = [key for key in keys if len({str(each.get(key)) for each in facts}) == 1]
+    if len(points) > 1:
+        keys = dict.fromkeys(key for key in keys if key not in common)
+        yield from _facts({"in all": "", **{key: facts[0].get(key) for key in common}})
+        yield ""
+    rows: list[list[object]] = [["point", *keys]]
+    for point, each in zip(points, facts, strict=True):
+        rows.append([point.identity[:_SHORT], *(each.get(key) for key in keys)])
+    yield from _folded(rows, width)
+
+
+def study_status(archive: Archive, study: Study) -> Iterator[str]:
+    """A study's points by state, then what is up to date."""
+    points = archive.points_of(study)
+    counts = count_states(points)
+    states = ", ".join(f"{counts[state]} {state}" for state in State if counts[state])
+    yield f"{study.name}: {len(points)} points: {states or 'none'}"
+    yield f"  tables  {_freshness(table_concerns(study, points))}"
+    figures = figure_concerns(study, points)
+    if not figures:
+        yield "  figures not drawn"
+    for name, concerns in figures.items():
+        yield f"  figure  {name}: {_freshness(concerns)}"
+
+
+def point_facts(point: KeptPoint) -> Iterator[str]:
+    """State, config and record by dotted keys, then the log."""
+    yield f"point    {point.identity}"
+    yield f"state    {point.known_state}"
+    yield f"folder   {point.folder}"
+    if point.known_state is State.STALE:
+        yield f"         source was {point.content['source'][:_SHORT]}, is {point.source[:_SHORT]}"
+    if failure := point.failure():
+        facts = flatten({key: value for key, value in failure.items() if key != "traceback"})
+        yield from ["", "failure", *_facts(facts), *f"{failure.get('traceback')}".splitlines()]
+    if point.content:
+        record = {key: v for key, v in point.content.items() if key not in ("config", "summary")}
+        yield from ["", "config", *_facts(point.config), "", "record", *_facts(flatten(record))]
+        yield from ["", "summary", *_facts(point.summary)]
+    log = point.folder / "log.txt"
+    if log.exists():
+        yield from ["", "log", *(f"  {line}" for line in log.read_text().splitlines())]
+
+
+def study_facts(archive: Archive, study: Study) -> Iterator[str]:
+    """Status, what varies, and what the tables came from."""
+    yield from study_status(archive, study)
+    values: dict[str, dict[str, None]] = {}
+    for overrides in study.points.values():
+        for key, _, value in (override.partition("=") for override in overrides):
+            values.setdefault(key, {})[value] = None
+    yield from ["", "sweep", *_facts({key: ", ".join(each) for key, each in values.items()})]
+    if study.collated:
+        collated = study.collated
+        facts: dict[str, object] = {
+            "sources": ", ".join(f"{s[:_SHORT]} ({n})" for s, n in collated.sources.items()),
+            "commits": ", ".join(c[:_SHORT] for c in collated.commits) or None,
+            "dirty": collated.dirty,
+            "started": " to ".join(collated.started),
+        }
+        yield from ["", "tables from", *_facts(facts), "", "tables"]
+        yield from _facts({name: digest[:_SHORT] for name, digest in collated.tables.items()})
+
+
+def differences(one: KeptPoint, two: KeptPoint, width: int | None) -> Iterator[str]:
+    """Differing facts of two points, side by side."""
+    parts: list[tuple[str, Mapping[str, Any], Mapping[str, Any]]] = [
+        ("config", one.config, two.config),
+        ("versions and run", _comparable(one.content), _comparable(two.content)),
+        ("tables", one.content.get("files", {}), two.content.get("files", {})),
+        ("summary", one.summary, two.summary),
+    ]
+    rows = [
+        ["", one.identity[:_SHORT], two.identity[:_SHORT]],
+        ["state", str(one.known_state), str(two.known_state)],
+    ]
+    for title, first, second in parts:
+        keys = [k for k in dict.fromkeys((*first, *second)) if first.get(k) != second.get(k)]
+        rows.append([f"{title}: {len(keys) or 'nothing'} differ{'s' * (len(keys) < 2)}", "", ""])
+        rows += [[f"  {key}", _text(first.get(key)), _text(second.get(key))] for key in keys]
+    if width is not None:
+        room = max(_SHORT, (width - 4 - max(len(row[0]) for row in rows)) // 2)
+        rows = [[key, *(_cut(text, room) for text in texts)] for key, *texts in rows]
+    yield from table_lines(rows)
+
+
+def _comparable(record: dict[str, Any]) -> dict[str, Any]:
+    """What of a record tells how and where a point ran."""
+    own = ("identity", "config", "seed", "summary", "files", "stages")
+    return flatten({key: value for key, value in record.items() if key not in own})
+
+
+def _freshness(concerns: Sequence[str]) -> str:
+    """Whether something is up to date, and why not."""
+    return f"not up to date: {'; '.join(concerns)}" if concerns else "up to date"
+
+
+def _facts(facts: Mapping[str, Any]) -> Iterator[str]:
+    """A line for each fact."""
+    yield from table_lines([[f"  {key}", _text(value)] for key, value in facts.items()] or [[""]])
+
+
+def _without_empty(rows: Sequence[Sequence[object]], width: int | None) -> Iterator[str]:
+    """A table's lines, without the columns that no row fills."""
+    if len(rows) == 1:
+        return iter(["no such point"])
+    filled = [
+        any(cell not in (None, "") for cell in column[1:]) for column in zip(*rows, strict=True)
+    ]
+    kept = [[cell for cell, keep in zip(row, filled, strict=True) if keep] for row in rows]
+    return table_lines(kept, width)
+
+
+def _folded(rows: Sequence[Sequence[object]], width: int | None) -> Iterator[str]:
+    """A table's lines, in as many blocks as need be; each opens with the first column."""
+    first, end = 1, len(rows[0])
+    while first < len(rows[0]):
+        block = [[row[0], *row[first:end]] for row in rows]
+        lines = list(table_lines(block))
+        if width is not None and end - first > 1 and max(map(len, lines)) > width:
+            end -= 1
+            continue
+        yield from [*([""] if first > 1 else []), *lines]
+        first, end = end, len(rows[0])
+
+
+def _rounded(value: object) -> object:
+    """A number as a person reads it."""
+    return float(f"{value:.4g}") if isinstance(value, float) else value
+
+
+def _text(value: object) -> str:
+    """A fact as text; a long hash by its beginning."""
+    if isinstance(value, str) and len(value) in (32, 40, 64) and value.isalnum():
+        return value[:_SHORT]
+    return "-" if value is None else str(value)
+
+
+def _cut(text: str, room: int) -> str:
+    """A text no longer than some room."""
+    return text if len(text) <= room else f"{text[: room - 3]}..."

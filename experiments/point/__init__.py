@@ -1,0 +1,1 @@
+"""One point of a study: infer, measure, tables."""

@@ -1,0 +1,249 @@
+"""The stages that points share, kept in the store by the content of what they depend on.
+
+The safe set of a truth and the demonstrations under it are computed once for all grids, time steps
+and action counts; the tabular model once for all truths, seeds and tasks.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+import mlci.constant_controls
+import mlci.demonstrator
+import mlci.reachability
+import mlci.safety_filter
+import mlci.tabular
+from experiments.config.settings import Settings
+from experiments.tracking.store import Store, Stored
+from mlci.constant_controls import solve_escapes
+from mlci.demonstrator import Outcome, Trial, crossing, demonstrate, sample_trials
+from mlci.grids import Grid
+from mlci.reachability import SafeSet, solve
+from mlci.regions import ConstraintSet
+from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.spaces import Box, Floats, Ints
+from mlci.tabular import TabularMDP, action_grid, discretize
+
+# What is stored of a tabular MDP: its own arrays, and those of the sparse matrix of crossings.
+_MOVES = ("successor", "reward", "allowed", "action")
+_CROSSINGS = ("indices", "indptr")
+
+_MOST_BATCHES = 20  # of tasks, among which enough must cross the truth where only those count
+
+
+@dataclass(frozen=True, eq=False)
+class TrialSet:
+    """Every trial of a truth, kept or rejected.
+
+    Attributes:
+        outcome: (P,) `Outcome` values.
+        starts: (P, n) first states.
+        goal_lower: (P, n) lower corners of the goals.
+        goal_upper: (P, n) upper corners.
+        states: (P, K+1, n) paths.
+        controls: (P, K, m) applied controls.
+        cost: (P,) optimiser's cost.
+        miss: (P,) final distance to the goal, raw units.
+    """
+
+    outcome: np.ndarray
+    starts: Floats
+    goal_lower: Floats
+    goal_upper: Floats
+    states: Floats
+    controls: Floats
+    cost: Floats
+    miss: Floats
+
+    def kept(self, most: int) -> Ints:
+        """Indices of the first `most` trials that were kept."""
+        return np.flatnonzero(self.outcome == Outcome.KEPT.value)[:most]
+
+    def goal(self, trial: int) -> Box:
+        """The goal of a trial."""
+        return Box(self.goal_lower[trial], self.goal_upper[trial])
+
+    def counts(self) -> dict[str, int]:
+        """How many trials had each outcome."""
+        return {kind.value: int(np.sum(self.outcome == kind.value)) for kind in Outcome}
+
+
+def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
+    """Omega of a truth (10), from the store or computed, and its key in the store."""
+    grid = Grid(settings.model.space, settings.safety.shape)
+
+    escapes = settings.safety.method == "escapes"
+
+    def compute() -> dict[str, np.ndarray]:
+        system, truth = settings.model, settings.constraint
+        if escapes:
+            found = solve_escapes(system, grid, truth, horizon=settings.horizon)
+        else:
+            found = solve(system, grid, truth)
+        return {"values": found.values, "gradients": found.gradients}
+
+    depends: tuple[Any, ...] = (
+        settings.system,
+        _corners(settings.constraint),
+        settings.safety.shape,
+    )
+    if escapes:
+        depends = (*depends, settings.horizon)
+    source = mlci.constant_controls if escapes else mlci.reachability
+    stored = store.get("safe_set", depends, [source, _system_module(settings)], compute)
+    return SafeSet(grid, stored["values"], stored["gradients"]), stored.key
+
+
+def demonstrations(settings: Settings, store: Store) -> TrialSet:
+    """The trials of a truth (8), from the store or computed."""
+    system, chosen, safety = settings.model, settings.demonstrations, settings.safety
+    omega, omega_key, margin, filter_ = None, None, safety.margin, None
+    if len(settings.constraint):  # where nothing is forbidden, everything is safe
+        omega, omega_key = safe_set(settings, store)
+        margin = border_margin(system, omega, chosen.dt) if margin is None else margin
+        filter_ = SafetyFilter(system, omega, chosen.dt, margin, safety.width)
+
+    def compute() -> dict[str, np.ndarray]:
+        attempts = demonstrate(
+            system,
+            _trials(settings, omega, margin or 0.0),
+            settings.constraint,
+            filter_,
+            **_skill(settings),
+        )
+        shown = [attempt.demonstration for attempt in attempts]
+        return {
+            "outcome": np.array([attempt.outcome.value for attempt in attempts]),
+            "starts": np.array([demonstration.task.start for demonstration in shown]),
+            "goal_lower": np.array([demonstration.task.goal.lower for demonstration in shown]),
+            "goal_upper": np.array([demonstration.task.goal.upper for demonstration in shown]),
+            "states": np.array([demonstration.states for demonstration in shown]),
+            "controls": np.array([demonstration.controls for demonstration in shown]),
+            "cost": np.array([attempt.cost for attempt in attempts]),
+            "miss": np.array([attempt.miss for attempt in attempts]),
+        }
+
+    # How many survivors make the study is decided later, and must not make them anew.
+    depends = (
+        omega_key,
+        replace(chosen, keep=chosen.pairs),
+        settings.tasks,
+        safety,
+        settings.horizon,
+        settings.seed,
+    )
+    modules = [mlci.demonstrator, mlci.safety_filter, sys.modules[__name__]]
+    return TrialSet(**store.get("demonstrations", depends, modules, compute))
+
+
+def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Trial]:
+    """The trials that the demonstrator tries.
+
+    Raises:
+        RuntimeError: too few tasks cross the truth, where only those are wanted.
+    """
+    system, chosen = settings.model, settings.demonstrations
+    draw = partial(
+        sample_trials,
+        system,
+        omega,
+        settings.tasks.start_box(system.space),
+        trials=chosen.pairs,
+        seed=settings.seed,
+        horizon=settings.horizon,
+        dt=chosen.dt,
+        margin=margin,
+        goal_offsets=settings.tasks.goal_offsets,
+        restarts=chosen.restarts,
+        hold=chosen.hold,
+    )
+    if not settings.tasks.crossing:
+        return draw()
+    found: list[Trial] = []
+    for batch in range(_MOST_BATCHES):
+        drawn = draw(first=batch * chosen.pairs)
+        found += crossing(system, drawn, settings.constraint, **_skill(settings))
+        if len(found) >= chosen.pairs:
+            return found[: chosen.pairs]
+    raise RuntimeError(
+        f"of {_MOST_BATCHES * chosen.pairs} tasks only {len(found)} would enter the truth if it "
+        "were not there: widen truth.boxes or tasks, or set tasks.crossing=false"
+    )
+
+
+def _skill(settings: Settings) -> dict[str, Any]:
+    """What `demonstrate` has to know of a demonstrator, beside tasks, truth and filter."""
+    chosen = settings.demonstrations
+    return {
+        "dt": chosen.dt,
+        "goal_weight": chosen.goal_weight,
+        "iterations": chosen.iterations,
+        "goal_tolerance": chosen.goal_tolerance,
+        "wind": chosen.wind,
+        "limit": settings.model.control_box if chosen.clip else None,
+    }
+
+
+def tabular_model(settings: Settings, store: Store) -> TabularMDP:
+    """The tabular MDP (1), whose moves know the hypotheses that they cross, and then the truth."""
+    hypotheses, truth = settings.candidates, settings.constraint
+    stored = _discretized(settings, store, "mdp", hypotheses, (*_MOVES, *_CROSSINGS))
+    # Apart, so that points which differ in the truth share what takes the time.
+    apart = _discretized(settings, store, "mdp_truth", truth, _CROSSINGS)
+    crosses = [
+        sparse.csr_matrix(
+            (np.ones(len(each["indices"]), dtype=bool), each["indices"], each["indptr"]),
+            shape=(stored["successor"].size, len(regions)),
+        )
+        for each, regions in ((stored, hypotheses), (apart, truth))
+    ]
+    moves = {name: stored[name] for name in _MOVES}
+    return TabularMDP(**moves, crosses=sparse.hstack(crosses, format="csr"))
+
+
+def _discretized(
+    settings: Settings, store: Store, stage: str, regions: ConstraintSet, wanted: Sequence[str]
+) -> Stored:
+    """Arrays of the tabular MDP with the crossings of some regions, from the store or computed."""
+    counts, samples = settings.action_counts, settings.transition.samples
+
+    def compute() -> dict[str, np.ndarray]:
+        system = settings.model
+        actions = action_grid(system, counts)
+        mdp = discretize(
+            system, settings.cells, actions, settings.dt, regions, samples, settings.temperature
+        )
+        arrays = {name: getattr(mdp, name) for name in _MOVES}
+        arrays |= {name: getattr(mdp.crosses, name) for name in _CROSSINGS}
+        return {name: arrays[name] for name in wanted}
+
+    depends = (
+        settings.system,
+        settings.grid,
+        counts,
+        settings.dt,
+        samples,
+        settings.temperature,
+        _corners(regions),
+    )
+    modules = [mlci.tabular, _system_module(settings), sys.modules[__name__]]
+    return store.get(stage, depends, modules, compute)
+
+
+def _corners(regions: ConstraintSet) -> list[list[str]]:
+    """The corners of regions, for a key: infinite sides are no JSON."""
+    sides = np.hstack([regions.lower, regions.upper])
+    return [[repr(float(side)) for side in box] for box in sides]
+
+
+def _system_module(settings: Settings) -> ModuleType:
+    """The module that defines the system."""
+    return sys.modules[type(settings.model).__module__]

@@ -1,0 +1,84 @@
+"""Tables of one point that show single trajectories beside single demonstrations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from mlci.spaces import Bools, Floats, Ints
+from mlci.tabular import TabularMDP
+
+
+def telling_trial(feasible: Bools, unconstrained: Floats, covered: Bools) -> int:
+    """The trial that shows best what a constraint does.
+
+    It is the feasible one that is most likely to violate the truth where nobody forbids it, and
+    the first of equals.
+
+    Args:
+        feasible: (N,) which trials the tabular agent can do under the truth.
+        unconstrained: (N, C) violation probabilities without constraint.
+        covered: (C,) which hypotheses lie inside the truth.
+    """
+    return int(np.argmax(np.where(feasible, np.sum(unconstrained[:, covered], axis=1), -1.0)))
+
+
+def trajectory_tables(
+    mdp: TabularMDP,
+    trajectories: Mapping[int, tuple[Ints, Ints]],
+    violated: Mapping[int, Bools],
+    shown: int | None,
+) -> dict[str, pd.DataFrame]:
+    """Sampled trajectories, the hypotheses that they and the demonstrations violate, some moves.
+
+    Args:
+        mdp: the tabular model; its first regions are the hypotheses.
+        trajectories: cells (T+1,) and moves (T,) of one sampled trajectory, by trial.
+        violated: (C,) hypotheses that a demonstration violates, by trial.
+        shown: the trial whose trajectory is shown with its moves.
+
+    Returns:
+        `sampled`, a row a step of a trajectory; `violations`, a row a hypothesis that a
+        demonstration or a trajectory violates; and `moves`, a row an action and successor of the
+        cells that the trajectory of `shown` visits.
+    """
+    visits, crossed = [], []
+    for trial, (cells, moves) in trajectories.items():
+        visits += [(trial, step, cell) for step, cell in enumerate(cells)]
+        regions = np.unique(mdp.crosses[cells[:-1] * mdp.moves + moves].indices)
+        crossed += [(trial, "sampled", i) for i in regions if i < len(violated[trial])]
+    for trial, regions in violated.items():
+        crossed += [(trial, "demonstration", i) for i in np.flatnonzero(regions)]
+    steps = {
+        (int(cell), int(mdp.action[move]), int(mdp.successor[cell, move]))
+        for cell in (() if shown is None else trajectories[shown][0])
+        for move in np.flatnonzero(mdp.allowed[cell])
+    }
+    return {
+        "sampled": pd.DataFrame(visits, columns=["trial", "step", "cell"]),
+        "violations": pd.DataFrame(sorted(crossed), columns=["trial", "source", "hypothesis"]),
+        "moves": pd.DataFrame(sorted(steps), columns=["cell", "action", "successor"]),
+    }
+
+
+def probability_table(
+    trial: int | None, unconstrained: Floats, constrained: Floats
+) -> pd.DataFrame:
+    """Phi of one trial, a row a hypothesis, without the truth and under it; no row for no trial.
+
+    Args:
+        trial: its number.
+        unconstrained: (C,) violation probabilities.
+        constrained: (C,) the same under the truth.
+    """
+    table = pd.DataFrame(
+        {
+            "trial": -1 if trial is None else trial,
+            "hypothesis": np.arange(len(unconstrained)),
+            "unconstrained": unconstrained,
+            "constrained": constrained,
+        }
+    )
+    return table if trial is not None else table.head(0)

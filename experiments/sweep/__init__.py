@@ -1,0 +1,1 @@
+"""Many points: planned, run in workers, on this machine or others."""

@@ -1,0 +1,56 @@
+"""The sweeper and the launchers, made known to Hydra."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from hydra.core.config_store import ConfigStore
+from hydra.core.plugins import Plugins
+
+from experiments.sweep.dask_jobs import DaskLauncher
+from experiments.sweep.planner import Planner
+from experiments.sweep.pool import PoolLauncher
+from experiments.sweep.slurm import SlurmLauncher
+
+_SLURM = {
+    "jobs": 100,  # of the array; the points are dealt to them
+    "poll": 2.0,  # [s] between looks at the queue
+    "fail_fast": "${sweep.fail_fast}",
+    # What each job asks for; null leaves it to the cluster.
+    "partition": None,
+    "timeout_min": 60,
+    "cpus_per_task": 1,  # and as many points at once
+    "mem_gb": None,
+    "array_parallelism": 256,  # jobs that run at the same time
+    "setup": None,  # shell commands before, as a list
+    "additional_parameters": None,  # more of sbatch's options: {account: mine}
+}
+
+_DASK = {
+    "jobs": 100,  # the points are dealt to them
+    "scheduler": None,  # address of a running cluster; null starts one in this process
+    "threads": "${workers}",  # of the cluster in this process
+    "fail_fast": "${sweep.fail_fast}",
+}
+
+
+@cache  # Hydra 1.4 wants them once
+def register_plugins() -> None:
+    """Make the sweeper and the launcher known to Hydra, however the project is installed."""
+    # Hydra 1.3 accepts plugins of the package `hydra_plugins` only; 1.4 has no such rule.
+    Plugins.is_in_toplevel_plugins_module = staticmethod(lambda target: True)  # type: ignore[assignment, method-assign]
+    for group, name, plugin, settings in (
+        ("hydra/sweeper", "planner", Planner, {"params": None, "cases": None, "ends": False}),
+        (
+            "hydra/launcher",
+            "pool",
+            PoolLauncher,
+            {"workers": "${workers}", "fail_fast": "${sweep.fail_fast}"},
+        ),
+        ("hydra/launcher", "slurm", SlurmLauncher, _SLURM),
+        ("hydra/launcher", "dask", DaskLauncher, _DASK),
+    ):
+        Plugins.instance().register(plugin)
+        target = f"{plugin.__module__}.{plugin.__name__}"
+        node = {"_target_": target, **settings}
+        ConfigStore.instance().store(group=group, name=name, node=node, provider="mlci")

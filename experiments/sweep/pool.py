@@ -1,0 +1,156 @@
+"""A Hydra launcher that runs points in parallel processes, each of which can fail alone."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from itertools import islice
+from multiprocessing import resource_tracker
+from typing import Any, NoReturn
+
+from hydra.core.utils import JobReturn, JobStatus
+from hydra.plugins.launcher import Launcher
+from hydra.types import HydraContext, TaskFunction
+from omegaconf import DictConfig, OmegaConf
+from pebble import ProcessExpired, ProcessPool
+from tqdm import tqdm
+
+from experiments.config.read import plain_tree
+
+_BAR = "{percentage:3.0f}%|{bar:20}| {n}/{total} points, {elapsed} gone, {remaining} left{postfix}"
+_REFRESH = 0.5  # [s]
+
+Job = tuple[str, ...]
+
+
+class PoolLauncher(Launcher):
+    """Worker processes on this machine.
+
+    Attributes:
+        workers: number of processes; None for one a core.
+        fail_fast: start no job after one has failed.
+        names: what the sweeper calls jobs, by their overrides.
+        composed: configs that the sweeper has composed already, by their overrides.
+    """
+
+    def __init__(self, workers: int | None, fail_fast: bool) -> None:
+        self.workers = workers or len(os.sched_getaffinity(0))
+        self.fail_fast = fail_fast
+        self.names: Mapping[Job, str] = {}
+        self.composed: Mapping[Job, dict[str, Any]] = {}
+
+    def setup(
+        self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
+    ) -> None:
+        self.context, self.task, self.config = hydra_context, task_function, config
+
+    def launch(
+        self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
+    ) -> Sequence[JobReturn]:
+        """Run all jobs; a failed one is returned with its exception, and stops no other.
+
+        Each is reported when it ends: on a bar in a terminal, else on a line.
+        """
+        jobs = [tuple(overrides) for overrides in job_overrides]
+        returns = {job: JobReturn(overrides=list(job)) for job in jobs}  # UNKNOWN until it ran
+        terminal = sys.stderr.isatty()
+        bar = tqdm(total=len(jobs), bar_format=_BAR, disable=not terminal)
+        pool = ProcessPool(
+            min(self.workers, len(jobs)),
+            context=multiprocessing.get_context("spawn"),
+            initializer=_end_with,
+            initargs=[os.getpid()],
+        )
+        resource_tracker.ensure_running()  # its start would unblock the signal
+        waiting, ended, failures = iter(jobs), 0, 0
+        now: dict[Future[Any], Job] = {}
+        try:
+            # Workers inherit the mask: Ctrl-C reaches this process only, which then stops them.
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                for job in islice(waiting, self.workers):
+                    now[pool.schedule(_work, [self.task, self._tree(job)])] = job
+            finally:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+            while now:
+                self._show(bar, failures, now.values())
+                for future in wait(now, _REFRESH, FIRST_COMPLETED).done:
+                    job = now.pop(future)
+                    returned = returns[job]
+                    if error := _error(future):
+                        returned.status, returned.return_value = JobStatus.FAILED, error
+                        told = "FAILED"
+                    else:
+                        returned.status = JobStatus.COMPLETED
+                        returned.return_value, seconds = future.result()
+                        told = f"{returned.return_value}, {seconds:.1f} s"
+                    ended += 1
+                    failures += error is not None
+                    bar.update()
+                    if not terminal:
+                        print(f"[{ended}/{len(jobs)}] {self._name(job)}: {told}", flush=True)
+                    if not (self.fail_fast and failures):
+                        for job in islice(waiting, 1):
+                            now[pool.schedule(_work, [self.task, self._tree(job)])] = job
+            self._show(bar, failures, [])
+        finally:
+            pool.stop()
+            # The pool closes its locks before its workers; one that still starts would complain.
+            for worker in multiprocessing.active_children():
+                worker.kill()
+            pool.join()
+            bar.close()
+        return [returns[job] for job in jobs]
+
+    def _show(self, bar: tqdm[NoReturn], failures: int, now: Iterable[Job]) -> None:
+        """Failures so far, and what runs now, at the end of the bar."""
+        failed = [f"{failures} failed"] if failures else []
+        bar.set_postfix_str(" | ".join([*failed, *map(self._name, now)]))
+
+    def _name(self, job: Job) -> str:
+        """What tells a job from the others."""
+        return self.names.get(job) or " ".join(job)
+
+    def _tree(self, job: Job) -> dict[str, Any]:
+        """The resolved config of a job."""
+        if job in self.composed:
+            return self.composed[job]
+        return plain_tree(self.context.config_loader.load_sweep_config(self.config, list(job)))
+
+
+def end_when(needless: Callable[[], bool]) -> None:
+    """End this process once nobody needs it."""
+
+    def watch() -> None:
+        while not needless():
+            time.sleep(0.2)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """In a worker: end when the process that started it has ended, however that was killed."""
+    end_when(lambda: os.getppid() != parent)
+
+
+def _error(future: Future[Any]) -> BaseException | None:
+    """What a job failed with."""
+    error = future.exception()
+    if isinstance(error, ProcessExpired):
+        code = error.exitcode
+        how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with {code}"
+        return ChildProcessError(f"the worker process {how}")
+    return error
+
+
+def _work(task: TaskFunction, tree: dict[str, Any]) -> tuple[Any, float]:
+    """In a worker: the task's value and its time."""
+    start = time.perf_counter()
+    return task(OmegaConf.create(tree)), time.perf_counter() - start

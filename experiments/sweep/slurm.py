@@ -1,0 +1,101 @@
+"""A Hydra launcher that runs points as SLURM jobs.
+
+Whether a job has ended is read from `squeue`, so that no accounting is needed.
+"""
+
+from __future__ import annotations
+
+import getpass
+import shutil
+import subprocess
+import time
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from experiments.config.read import ConfigError
+from experiments.sweep.cluster import ClusterLauncher, Share, run_share
+
+_PATIENCE = 3  # looks at the queue in which a job must be absent before it counts as ended
+_SUBMISSION = {  # what submitit calls our own options
+    "partition": "slurm_partition",
+    "array_parallelism": "slurm_array_parallelism",
+    "setup": "slurm_setup",
+    "additional_parameters": "slurm_additional_parameters",
+}
+
+
+class SlurmLauncher(ClusterLauncher):
+    """Jobs of one SLURM array.
+
+    Attributes:
+        poll: [s] between looks at the queue.
+        resources: what a job asks for: `timeout_min`, `cpus_per_task`, `mem_gb`, `partition`,
+            `array_parallelism` and the like; None is the cluster's own default.
+    """
+
+    def __init__(self, jobs: int, poll: float, fail_fast: bool, **resources: Any) -> None:
+        super().__init__(jobs, resources["cpus_per_task"], fail_fast)
+        self.poll = poll
+        self.resources = {
+            _SUBMISSION.get(key, key): value
+            for key, value in resources.items()
+            if value is not None
+        }
+
+    def _look(self) -> None:
+        if find_spec("submitit") is None:
+            raise ConfigError("hydra/launcher: slurm needs pip install 'mlci[slurm]'")
+        if shutil.which("sbatch") is None:
+            raise ConfigError("hydra/launcher: slurm needs sbatch, which is not on this machine")
+
+    def _run(self, shares: Sequence[Share], folder: Path) -> list[str]:
+        ids = self._submit(shares, folder)
+        try:
+            self._wait(ids)
+        finally:
+            subprocess.run(["scancel", *{each.partition("_")[0] for each in ids}], check=False)
+            for pickled in folder.glob("*.pkl"):
+                pickled.unlink()
+        return [f"SLURM job {each}" for each in ids]
+
+    def _submit(self, shares: Sequence[Share], folder: Path) -> list[str]:
+        """Hand the shares to SLURM; returns each one's job id, such as 12_3."""
+        import submitit  # an extra
+
+        executor = submitit.AutoExecutor(folder, cluster="slurm")
+        executor.update_parameters(name="mlci", **self.resources)
+        try:
+            jobs = executor.map_array(run_share, shares, [self.workers] * len(shares))
+        except submitit.core.utils.FailedJobError as error:
+            raise ConfigError(f"hydra/launcher: SLURM refused the jobs: {error}") from None
+        print(
+            f"{len(jobs)} SLURM jobs, {jobs[0].job_id} to {jobs[-1].job_id}: {folder}", flush=True
+        )
+        return [job.job_id for job in jobs]
+
+    def _wait(self, ids: Sequence[str]) -> None:
+        """Until no job is in the queue any more; looks at no file, of which there may be many."""
+        absent = dict.fromkeys(ids, 0)
+        with tqdm(total=len(ids), unit="job", disable=None) as bar:
+            while min(absent.values()) < _PATIENCE:
+                time.sleep(self.poll)
+                queue = _queue()
+                if queue is None:
+                    continue
+                absent = {each: 0 if each in queue else n + 1 for each, n in absent.items()}
+                ended = sum(n >= _PATIENCE for n in absent.values())
+                if bar.disable and ended > bar.n:
+                    print(f"[{ended}/{len(ids)}] jobs ended", flush=True)
+                bar.n = ended
+                bar.refresh()
+
+
+def _queue() -> set[str] | None:
+    """Ids of this user's jobs that wait or run; None if SLURM does not answer now."""
+    command = ["squeue", "--noheader", "--array", "--format=%i", f"--user={getpass.getuser()}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return set(done.stdout.split()) if done.returncode == 0 else None

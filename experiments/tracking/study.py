@@ -1,0 +1,167 @@
+"""A study on disk: `study.json` lists its points and, once collated, what its tables came from.
+
+{"points": {identity: [override, ...], ...},     as planned when the sweep started
+ "collated": null or {
+   "points": [identity, ...],                    in the order of the tables' rows
+   "sources": {hash of the source: points, ...},
+   "commits": [git commit, ...], "dirty": whether any had changes,
+   "started": [first, last],                     when its points were run
+   "seconds": of all points, "peak_memory_mb": the most of one,
+   "machines": [name, ...], "versions": [package and version, ...],
+   "tables": {file: sha256, ...}}}
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.tracking.files import replace_file
+from experiments.tracking.trees import plain
+
+if TYPE_CHECKING:
+    from experiments.tracking.points import Point
+
+
+class StudyError(Exception):
+    """A listing that cannot be read; the message names it."""
+
+
+@dataclass(frozen=True)
+class Collated:
+    """What the tables of a study came from.
+
+    Attributes:
+        points: identities, in the order of the tables' rows.
+        sources: how many points come from each version of the source, by its hash.
+        commits: the git commits that were checked out, where they are known.
+        dirty: whether anything differed from them.
+        started: when the first and the last point were started, as ISO 8601.
+        seconds: that all points took, one after the other; what points share counts once.
+        peak_memory_mb: the most that the process of one point needed.
+        machines: processor, cores and system of each machine that ran points.
+        versions: of Python and the packages that results depend on, spelt "numpy 2.4.6".
+        tables: sha256 of each table, by its file's name.
+    """
+
+    points: tuple[str, ...]
+    sources: Mapping[str, int]
+    commits: tuple[str, ...]
+    dirty: bool
+    started: tuple[str, str]
+    seconds: float
+    peak_memory_mb: int
+    machines: tuple[str, ...]
+    versions: tuple[str, ...]
+    tables: Mapping[str, str]
+
+
+def collated(records: Mapping[str, Mapping[str, Any]], tables: Mapping[str, str]) -> Collated:
+    """What tables came from, of the records of their points.
+
+    Args:
+        records: by identity, in the order of the tables' rows.
+        tables: sha256 of each table, by its file's name.
+    """
+    each = list(records.values())
+    started = [record["started"] for record in each]
+    versions = {
+        f"{package} {version}"
+        for record in each
+        for package, version in {"python": record["python"], **record["packages"]}.items()
+        if version
+    }
+    return Collated(
+        points=tuple(records),
+        sources=dict(sorted(Counter(record["source"] for record in each).items())),
+        commits=tuple(sorted({r["git"]["commit"] for r in each if r["git"]["commit"]})),
+        dirty=any(record["git"]["dirty"] for record in each),
+        started=(min(started), max(started)),
+        seconds=round(sum(record["seconds"]["total"] for record in each), 1),
+        peak_memory_mb=max(record["peak_memory_mb"] for record in each),
+        machines=tuple(sorted({f"{r['cpu']}, {r['cores']} cores, {r['system']}" for r in each})),
+        versions=tuple(sorted(versions)),
+        tables=tables,
+    )
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study.
+
+    Attributes:
+        folder: where it is kept.
+        points: the overrides that make each point, by its identity, as they were planned.
+        collated: what its tables came from; None before they are written.
+    """
+
+    folder: Path
+    points: Mapping[str, tuple[str, ...]]
+    collated: Collated | None
+
+    @property
+    def name(self) -> str:
+        return self.folder.name
+
+    def save(self) -> None:
+        """Write the listing."""
+        tree = {"points": plain(self.points), "collated": plain(self.collated)}
+        replace_file(self.folder / "study.json", json.dumps(tree, indent=1).encode() + b"\n")
+
+
+def read_study(folder: Path) -> Study | None:
+    """The study of a folder, or None if it has no listing.
+
+    Raises:
+        StudyError: the listing cannot be read.
+    """
+    path = folder / "study.json"
+    try:
+        tree: dict[str, Any] = json.loads(path.read_bytes())
+        points = {name: tuple(overrides) for name, overrides in tree["points"].items()}
+        found = tree["collated"]
+        collated = found and Collated(
+            tuple(found["points"]),
+            dict(found["sources"]),
+            tuple(found["commits"]),
+            bool(found["dirty"]),
+            (found["started"][0], found["started"][1]),
+            float(found["seconds"]),
+            int(found["peak_memory_mb"]),
+            tuple(found["machines"]),
+            tuple(found["versions"]),
+            dict(found["tables"]),
+        )
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError):
+        raise StudyError(
+            f"{path} cannot be read as a study; the study's own command writes it anew"
+        ) from None
+    return Study(folder, points, collated)
+
+
+def write_plan(folder: Path, points: Sequence[tuple[Point, Sequence[str]]]) -> None:
+    """List the points of a sweep that starts, each with its overrides; tables stay as they are."""
+    before = whole_study(folder)
+    planned = {point.identity: tuple(overrides) for point, overrides in points}
+    Study(folder, planned, before.collated if before else None).save()
+
+
+def write_collated(folder: Path, collated: Collated) -> None:
+    """List what the tables came from; the plan stays as it is."""
+    before = whole_study(folder)
+    points = before.points if before else {identity: () for identity in collated.points}
+    Study(folder, points, collated).save()
+
+
+def whole_study(folder: Path) -> Study | None:
+    """The study of a folder, or None if there is none that is whole."""
+    try:
+        return read_study(folder)
+    except StudyError:
+        return None

@@ -1,0 +1,1 @@
+"""Reading recorded demonstrations, and writing them."""

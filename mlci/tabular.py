@@ -1,0 +1,225 @@
+"""The tabular model of a continuous system (section IV) and its diagnosis.
+
+Two probabilistic models share these arrays, told apart by the number of start points a cell:
+
+* **Centre model** (one start point, the paper's). From cell s, action a leads to the one cell that
+  the flow from the centre x_s under u_a reaches after dt: the deterministic kernel (1).
+* **Cell-averaged model** (k^n start points). Before every step the position inside the cell is
+  drawn afresh, uniformly among the k^n centres of a regular subdivision. A trajectory is the
+  sequence of cells, actions and draws; its probability is proportional to e^R times that of its
+  draws, (1/k^n)^T, over all trajectories that end in the goal. So the draws are conditioned on the
+  goal as the actions are: it is (2) for the deterministic MDP whose choices are pairs of action and
+  start point, with a constant factor that cancels. It is not the causal-entropy policy of a
+  stochastic MDP, under which the demonstrator could not count on reaching any goal cell.
+
+Hence the second axis of the arrays is a *move*: an action from one start point, in the order
+move = action * k^n + start point. In the centre model a move is an action.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from mlci.grids import Grid
+from mlci.merged_moves import Ways, merge_moves
+from mlci.regions import ConstraintSet
+from mlci.simulate import rollout
+from mlci.spaces import Bools, Floats, Ints
+from mlci.systems import System
+
+_CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the curve it stands for
+_MOVES_AT_ONCE = 1 << 17  # what a step of long work holds beside its result: about 100 MB
+
+# Is told how many parts of long work are done, and of how many.
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class TabularMDP:
+    """A deterministic tabular MDP that knows which regions its moves cross.
+
+    Attributes:
+        successor: (S, M) cell after a move; -1 where it leaves the grid.
+        reward: (S, M) reward of a move, r dt / temperature [nat].
+        allowed: (S, M) whether a move may be taken.
+        crosses: (S * M, C) sparse boolean: row s * M + move, the regions its path enters.
+        action: (M,) index of the action that a move applies.
+
+    Raises:
+        ValueError: arrays whose shapes disagree, or an allowed move without a successor.
+    """
+
+    successor: Ints
+    reward: Floats
+    allowed: Bools
+    crosses: sparse.csr_matrix
+    action: Ints
+
+    def __post_init__(self) -> None:
+        shape = self.successor.shape
+        if not (
+            len(shape) == 2
+            and self.reward.shape == self.allowed.shape == shape
+            and self.action.shape == shape[1:]
+            and self.crosses.shape[0] == shape[0] * shape[1]
+        ):
+            raise ValueError(
+                f"successor {shape}, reward {self.reward.shape}, allowed {self.allowed.shape}, "
+                f"action {self.action.shape} and crosses {self.crosses.shape} do not agree"
+            )
+        if np.any(self.allowed & ((self.successor < 0) | (self.successor >= shape[0]))):
+            raise ValueError("a move that leads to no cell is marked as allowed")
+
+    @property
+    def states(self) -> int:
+        """S, the number of cells."""
+        return int(self.successor.shape[0])
+
+    @property
+    def moves(self) -> int:
+        """M, the number of moves of a cell."""
+        return int(self.successor.shape[1])
+
+    @cached_property
+    def ways(self) -> Ways:
+        """The moves of each cell, those that nothing tells apart taken together."""
+        return merge_moves(self.successor, self.reward, self.allowed, self.crosses, self.blocks())
+
+    def blocks(self) -> Iterator[slice]:
+        """Consecutive slices of the cells, of so many moves as one step of work should hold."""
+        size = max(1, _MOVES_AT_ONCE // self.moves)
+        for first in range(0, self.states, size):
+            yield slice(first, min(first + size, self.states))
+
+
+def action_grid(system: System, counts: int | Sequence[int]) -> Floats:
+    """(A, m) actions evenly spaced over the control box, its ends included (section IV-B).
+
+    Args:
+        system: gives the control box.
+        counts: number of values of each control, or one number for all; a single value is the
+            middle of its range.
+
+    Raises:
+        ValueError: a count below 1, or a list of the wrong length.
+    """
+    box = system.control_box
+    each = [counts] * box.dimension if isinstance(counts, int) else list(counts)
+    if len(each) != box.dimension or min(each) < 1:
+        raise ValueError(f"{box.dimension} controls need as many counts of at least 1, not {each}")
+    ticks = [
+        np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2])
+        for low, high, count in zip(box.lower, box.upper, each, strict=True)
+    ]
+    return np.stack([part.ravel() for part in np.meshgrid(*ticks, indexing="ij")], axis=-1)
+
+
+def discretize(
+    system: System,
+    grid: Grid,
+    actions: ArrayLike,
+    dt: float,
+    regions: ConstraintSet,
+    samples: int = 1,
+    temperature: float = 1.0,
+    progress: Progress | None = None,
+) -> TabularMDP:
+    """Form the tabular MDP of a continuous system, equation (1) and section IV-C.
+
+    Each move follows the true dynamics for dt. It is not allowed where its path leaves the state
+    space, and it crosses every region that the path enters, ends included.
+
+    Args:
+        system: the dynamics and the running reward r.
+        grid: the cells.
+        actions: (A, m) controls, held for dt.
+        dt: time step [s].
+        regions: the C regions whose crossings are kept: hypotheses, truths, or both.
+        samples: k; the moves of an action start at k^n points of the cell. 1 is the centre model,
+            more the cell-averaged one (see the module's head).
+        temperature: divides the reward (2).
+        progress: is told how many cells are done, and of how many.
+    """
+    actions = np.asarray(actions, dtype=float)
+    substeps = substep_count(system, grid, actions, dt)
+    points = samples ** len(grid.shape)
+    shape = grid.size, len(actions) * points
+    applied = np.repeat(actions, points, axis=0)  # (M, m) the control of each move
+    successor, reward = np.empty(shape, dtype=np.int64), np.empty(shape)
+    crosses = []
+    size = max(1, _MOVES_AT_ONCE // (shape[1] * substeps))
+    for first in range(0, grid.size, size):
+        block = slice(first, min(first + size, grid.size))
+        inside = grid.points_inside(samples, block)
+        origin = np.tile(inside, (1, len(actions), 1)).reshape(-1, inside.shape[-1])
+        control = np.tile(applied, (len(inside), 1))
+        path = rollout(system, origin, control[:, None, :], dt, substeps)
+        reached, crossed = _follow(grid, regions, path)
+        crosses.append(crossed)
+        successor[block] = reached.reshape(-1, shape[1])
+        rewards = system.running_reward(origin, control) * (dt / temperature)
+        reward[block] = rewards.reshape(-1, shape[1])
+        if progress is not None:
+            progress(block.stop, grid.size)
+    return TabularMDP(
+        successor=successor,
+        reward=reward,
+        allowed=successor >= 0,
+        crosses=sparse.vstack(crosses, format="csr"),
+        action=np.repeat(np.arange(len(actions)), points),
+    )
+
+
+def forbid(mdp: TabularMDP, regions: ArrayLike) -> TabularMDP:
+    """The MDP under constraints, equation (3): moves that cross any of `regions` are not allowed.
+
+    Args:
+        mdp: the MDP.
+        regions: indices of columns of `mdp.crosses`.
+    """
+    columns = np.atleast_1d(np.asarray(regions, dtype=np.int64))
+    crossed = np.asarray(mdp.crosses[:, columns].sum(axis=1)).reshape(mdp.successor.shape) > 0
+    forbidden = replace(mdp, allowed=mdp.allowed & ~crossed)
+    if "ways" in vars(mdp):  # what takes the time has been done
+        vars(forbidden)["ways"] = mdp.ways.without(crossed)
+    return forbidden
+
+
+def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int:
+    """Integrator steps a move, so that chords stay close to the curve they stand for.
+
+    A chord over time t strays |x''| t^2 / 8 from its curve, with x'' = dh/dx h under a held
+    control; and no chord may span a quarter of a period, for the short way round to be its own.
+    """
+    shortest = dt
+    quarter = np.where(grid.space.periodic, grid.space.bounds.widths / 4, np.inf)
+    for first in range(0, grid.size, _MOVES_AT_ONCE):
+        states = grid.centers[first : first + _MOVES_AT_ONCE]
+        for action in actions:
+            speed = system.dynamics(states, action[None, :])
+            by_state, _ = system.jacobians(states, action[None, :])
+            bend = np.max(np.abs(np.einsum("...ij,...j->...i", by_state, speed)), axis=0)
+            with np.errstate(divide="ignore"):
+                shortest = min(
+                    shortest,
+                    float(np.min(np.sqrt(8 * _CHORD_ERROR * grid.widths / bend))),
+                    float(np.min(quarter / np.max(np.abs(speed), axis=0))),
+                )
+    return int(np.ceil(dt / shortest - 1e-9))
+
+
+def _follow(grid: Grid, regions: ConstraintSet, path: Floats) -> tuple[Ints, sparse.csr_matrix]:
+    """Successor (-1 where the path leaves the space) and crossings of paths (Q, K+1, n)."""
+    stays = np.all(grid.space.contains(path), axis=-1)
+    successor = np.full(len(path), -1, dtype=np.int64)
+    successor[stays] = grid.index(path[stays, -1])
+    chords = path[stays, :-1], np.diff(path[stays], axis=1)
+    owner = np.repeat(np.flatnonzero(stays), path.shape[1] - 1)
+    flat = [part.reshape(-1, path.shape[-1]) for part in chords]
+    return successor, regions.crossings(flat[0], flat[1], owner, len(path))

@@ -1,0 +1,109 @@
+"""Every file of conf/ does what it is for; a new one is covered without touching a test."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hydra import compose, initialize_config_dir
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from omegaconf import OmegaConf
+
+from experiments.app import version_base
+from experiments.config.command_line import quote_options
+from experiments.config.paths import CONF
+from experiments.config.read import plain_tree, read_config, read_recorded_config
+from experiments.sweep.plugins import register_plugins
+
+register_plugins()
+
+OPTIONS = {
+    f"{path.parent.relative_to(CONF)}={path.stem}": path for path in sorted(CONF.rglob("*/*.yaml"))
+}
+# What the smoke scale may set: numbers of trials, the horizon, and the study that the tables go to.
+SMALLER = {"study", "horizon", "rollouts", "demonstrations", "ranks"}
+
+
+def composed(*words: str, config: str = "config") -> Any:
+    """A config, Hydra's own part included."""
+    with initialize_config_dir(str(CONF), **version_base()):
+        return compose(config, [quote_options(word) for word in words], return_hydra_config=True)
+
+
+def companions(option: str) -> list[str]:
+    """The truth that a system or grid needs beside it, as the files of truths tell."""
+    group, _, name = option.partition("=")
+    if group in ("system", "grid"):
+        for truth in sorted((CONF / "truth").glob("*.yaml")):
+            word = f"truth={truth.stem}"
+            if composed(word).hydra.runtime.choices[group] == name:
+                return [word]
+    return []
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_every_option_makes_a_point_that_can_run(option: str) -> None:
+    read_config(plain_tree(composed(option, *companions(option))))
+    if option.startswith(("system=", "truth=", "grid=")):
+        # What the file says is what the point gets.
+        content = yaml.safe_load(OPTIONS[option].read_text())
+        group = option.partition("=")[0]
+        given = content.get(group, content)
+        found = plain_tree(composed(option, *companions(option)))[group]
+        assert {key: found[key] for key in given} == given
+
+
+@pytest.mark.parametrize("option", [name for name in OPTIONS if name.startswith(("sy", "gr"))])
+def test_every_option_suits_recorded_demonstrations(option: str) -> None:
+    choices = composed(option, *companions(option)).hydra.runtime.choices
+    words = dict.fromkeys([option, f"system={choices.system}", "demonstrations=x.csv"])
+    read_recorded_config(plain_tree(composed(*words, config="infer")))
+
+
+def test_every_group_is_in_the_defaults() -> None:
+    chosen = composed().hydra.runtime.choices
+    assert {option.partition("=")[0] for option in OPTIONS} <= set(chosen)
+
+
+def test_smoke_scale_touches_no_axis_and_no_system() -> None:
+    scale = OmegaConf.load(CONF / "scale" / "smoke.yaml")
+    for experiment in (CONF / "experiment").glob("*.yaml"):
+        swept = composed(f"experiment={experiment.stem}").hydra.sweeper.params
+        for key in swept or ():
+            assert OmegaConf.select(scale, str(key)) is None
+    hydra = scale.pop("hydra")
+    assert set(scale) <= SMALLER
+    assert OmegaConf.to_container(hydra) == {"sweeper": {"ends": True}}
+
+
+@pytest.mark.parametrize("experiment", [name for name in OPTIONS if name.startswith("experiment=")])
+def test_every_experiment_is_valid_and_small_at_smoke_scale(
+    experiment: str, tmp_path: Path
+) -> None:
+    """`make smoke` runs and draws them."""
+    script = CONF.parent / "experiments" / "run.py"
+    words = ["-m", experiment, "scale=smoke", f"results={tmp_path}", "sweep.dry_run=true"]
+    done = subprocess.run(
+        [sys.executable, str(script), *words], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    sweeper = composed(experiment).hydra.sweeper
+    axes = sweeper.params or {}
+    points, parser = 0, OverridesParser.create()
+    for case in sweeper.cases or [[]]:
+        of_case = parser.parse_overrides([quote_options(word) for word in case])
+        swept = [list(word.sweep_iterator()) for word in of_case if word.is_sweep_override()]
+        points += math.prod(min(len(values), 2) for values in swept)
+    for override in OverridesParser.create().parse_overrides([f"{k}={v}" for k, v in axes.items()]):
+        key, values = override.key_or_group, [str(each) for each in override.sweep_iterator()]
+        points *= min(len(values), 2)
+        if len(values) > 2:  # a shortened axis is told, with the values that stand for it
+            told = next(line for line in done.stdout.splitlines() if line.startswith(f"{key}: "))
+            said = told.replace("'", "")
+            assert said.startswith(f"{key}: {values[0]} and {values[-1]} stand for all of")
+            assert said.endswith(", ".join(values))
+    assert f"{points} points: {points} missing" in done.stdout
+    assert points <= 100

@@ -1,0 +1,64 @@
+"""The estimate of memory, against what numpy asks for."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from experiments.config import memory
+from experiments.config.memory import expected_memory, machine_memory
+from experiments.config.settings import GridSettings, Settings
+from mlci.maxent import log_partition, violation_probabilities
+from mlci.spaces import Box
+from mlci.tabular import action_grid, discretize
+
+
+def test_a_model_takes_no_more_than_expected_and_not_much_less(
+    monkeypatch: pytest.MonkeyPatch, settings: Settings
+) -> None:
+    """Discretisation and one task; a point holds most arrays twice while it joins them."""
+    for name in ("mlci.tabular._MOVES_AT_ONCE", "mlci.maxent._CELLS_AT_ONCE"):
+        monkeypatch.setattr(name, 1 << 13)  # so that blocks of work do not count
+    large = dataclasses.replace(
+        settings, grid=GridSettings((160, 100), None), actions=9, dt=0.1, horizon=2.0
+    )
+    monkeypatch.setattr(memory, "_BYTES_AT_REST", 0)
+    tracemalloc.start()
+    actions = action_grid(large.model, large.action_counts)
+    mdp = discretize(large.model, large.cells, actions, large.dt, large.candidates)
+    start = int(large.cells.index([-1.0, 0.5]))
+    goal = large.cells.cells_in(Box(np.array([-0.5, -np.inf]), np.array([0.5, np.inf])))
+    log_z = log_partition(mdp, start, goal, 20)
+    phi = violation_probabilities(mdp, log_z, start)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert np.max(phi) > 0.5
+    assert peak < expected_memory(large) < 4 * peak
+
+
+def test_every_axis_of_size_counts(settings: Settings) -> None:
+    few = expected_memory(settings)
+    for changes in (
+        {"grid": GridSettings((1200, 8), None)},
+        {"actions": 300},
+        {"dt": 0.0005},
+        {"transition": dataclasses.replace(settings.transition, samples=10)},
+        {"hypotheses": dataclasses.replace(settings.hypotheses, shape=(1000, None))},
+    ):
+        assert expected_memory(dataclasses.replace(settings, **changes)) > few + 1e6
+
+
+def test_a_system_that_does_not_tell_its_memory_has_no_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert 1e8 < machine_memory() < math.inf
+
+    def refuse(name: str) -> int:
+        raise ValueError(name)
+
+    monkeypatch.setattr("os.sysconf", refuse)
+    assert machine_memory() == math.inf

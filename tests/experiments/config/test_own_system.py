@@ -1,0 +1,183 @@
+"""The README's own system, run in a folder of its own, and what is refused about others."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from refusals import refusal
+
+from experiments.config.paths import CHECKOUT
+from experiments.tracking import store
+from experiments.tracking.points import point_source
+
+SECTION = (CHECKOUT / "README.md").read_text().split("\n## Your own system\n")[1].split("\n## ")[0]
+# Indented blocks: a module, a config, and the commands.
+BLOCKS = [
+    re.sub("^    ", "", block, flags=re.MULTILINE).strip() + "\n"
+    for block in re.findall(r"(?:^(?:    .*)?\n)+", SECTION, flags=re.MULTILINE)
+    if block.strip()
+]
+SCRIPTS = {
+    "mlci-run": [str(CHECKOUT / "experiments" / "run.py")],
+    "mlci-infer": [str(CHECKOUT / "experiments" / "infer.py")],
+    "mlci-results": [str(CHECKOUT / "experiments" / "results.py")],
+    "mlci-figures": ["-m", "paper_figures"],
+}
+SMALL = ["grid.shape=[8,8,8]"]
+SMOKE = {"mlci-run": ["scale=smoke", "safety.shape=[21,21,12]", *SMALL], "mlci-infer": SMALL}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the README's two files."""
+    module, config, _ = BLOCKS
+    (tmp_path / "unicycle.py").write_text(module)
+    (tmp_path / "conf" / "subject").mkdir(parents=True)
+    (tmp_path / "conf" / "subject" / "unicycle.yaml").write_text(config)
+    return tmp_path
+
+
+def command(folder: Path, line: str) -> tuple[int, str, str]:
+    """Exit status, output and errors of a command of the README, at a small scale."""
+    name, *words = line.split()
+    done = subprocess.run(
+        [sys.executable, *SCRIPTS[name], *words, *SMOKE.get(name, [])],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_example_is_short_and_not_ours() -> None:
+    assert sum(len(block.splitlines()) for block in BLOCKS) < 60
+    assert not list(CHECKOUT.glob("mlci/**/*unicycle*"))
+
+
+def test_every_command_works_in_a_folder_of_its_own(folder: Path) -> None:
+    one, sweep, figures, infer = BLOCKS[2].splitlines()
+    status, out, err = command(folder, one)
+    assert status == 0, err
+    assert f"written: {folder}/results/points/" in out
+    status, out, err = command(folder, sweep)
+    assert status == 0, err
+    assert "2 points: 1 done, 1 missing; 1 to run" in out
+    tables = folder / "results" / "unicycle" / "tables"
+    assert set(pd.read_csv(tables / "summary.csv")["actions"]) == {"3x5"}
+    status, out, err = command(folder, figures)
+    assert status == 0, err
+    assert (folder / "results" / "unicycle" / "figures" / "hypothesis_map_pillar.pdf").is_file()
+
+    paths = pd.read_csv(tables / "paths.csv")
+    (folder / "recorded").mkdir()
+    for number, path in paths.groupby("demonstration"):
+        recorded = path[["time", "x", "y", "heading"]]
+        recorded.to_csv(folder / "recorded" / f"{number}.csv", index=False)
+    status, out, err = command(folder, infer)
+    assert status == 0, err
+    assert f"{paths['demonstration'].nunique()} used, 0 files not used" in out
+    assert re.search(r" x .* m, y .* m$", out, flags=re.MULTILINE)
+    assert sorted(path.name for path in folder.iterdir() if path.name != "__pycache__") == [
+        *("conf", "recorded", "results", "unicycle.py")
+    ]
+
+    module = folder / "unicycle.py"
+    module.write_text(module.read_text() + "\n# Edited.\n")
+    status, out, err = command(folder, f"{sweep} sweep.dry_run=true")
+    assert "2 points: 2 stale; 2 to run" in out
+    assert "2 stale" in " ".join(command(folder, "mlci-results status unicycle")[1].split())
+
+
+def test_source_counts_what_a_module_imports_from_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "mine_own.py").write_text("import numpy\nimport beside_it\n")
+    hashes = []
+    for helper, other in (("a = 1", "b = 1"), ("a = 2", "b = 1"), ("a = 2", "b = 2")):
+        (tmp_path / "beside_it.py").write_text(helper)
+        (tmp_path / "not_imported.py").write_text(other)
+        for cached in (store._read_source, store._module_names, store._beside):
+            cached.cache_clear()
+        hashes.append(point_source("mine_own.Mine"))
+    assert hashes[0] != hashes[1] == hashes[2]
+
+
+def test_folder_whose_config_hides_behind_ours_is_refused(folder: Path) -> None:
+    (folder / "conf" / "truth").mkdir()
+    (folder / "conf" / "truth" / "c1.yaml").write_text("name: c1\n")
+    status, _, err = command(folder, "mlci-run subject=unicycle")
+    assert status == 2
+    assert "conf/truth/c1.yaml: mlci comes with a truth/c1 of its own; rename this file" in err
+    assert len(err.splitlines()) == 1
+
+
+MINE = """
+from dataclasses import dataclass
+import numpy as np
+from mlci.systems import DoubleIntegrator, System
+class Half(System):
+    def dynamics(self, states, controls):
+        return states
+class Scalar(DoubleIntegrator):
+    def dynamics(self, states, controls):
+        return states[0]
+class Hinted(DoubleIntegrator):
+    def __init__(self, limit: "Nowhere" = 1.0):
+        super().__init__()
+class Broken(DoubleIntegrator):
+    def __init__(self):
+        {}["key"]
+"""
+REFUSED = {
+    "system._target_=mine.Half": "system._target_: 'mine.Half' does not define control_box, space",
+    "system._target_=mine.Full": "system._target_: 'mine.Full' cannot be imported: {}/mine.py "
+    "defines no Full",
+    "system._target_=mime.Full": "'mime.Full' cannot be imported: there is no module mime in {}, "
+    "nor installed",
+    "system._target_=bad.Bad": "'bad.Bad' cannot be imported: {}/bad.py, line 2: NameError: name "
+    "'nump' is not defined",
+    "system._target_=worse.Bad": "'worse.Bad' cannot be imported: SyntaxError: '(' was never "
+    "closed (worse.py, line 1)",
+    "system._target_=mine.Hinted": "system._target_: type hints of Hinted cannot be read: name "
+    "'Nowhere' is not defined",
+    "system._target_=mine.Broken": "system: Broken fails: KeyError: 'key'",
+    "system._target_=mine.Scalar": "system: Scalar.dynamics must be (7, 5, 2) for states (7, 1, 2) "
+    "and controls (5, 1), not (1, 2)",
+    "subject=unicycle": "subject=unicycle: there is no {}/conf/subject/unicycle.yaml",
+    "--config-dir=nowhere": "Additional config directory '{}/nowhere' not found",
+}
+
+
+@pytest.mark.parametrize("argument", REFUSED)
+def test_wrong_system_is_refused(
+    argument: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "mine.py").write_text(MINE)
+    (tmp_path / "bad.py").write_text("# Edit me.\nx = nump.pi\n")
+    (tmp_path / "worse.py").write_text("x = (\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    for name in ("mine", "bad", "worse"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    own = ["~system.gravity", "~system.length", "~system.speed_limit", "~system.control_limit"]
+    words = [argument, *(own if "_target_" in argument else [])]
+    said = refusal(words, monkeypatch, capsys)
+    assert REFUSED[argument].replace("{}", str(tmp_path)) in said
+    assert len(said.splitlines()) == 1
+
+
+def test_word_that_a_subject_overrules_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = refusal(["subject=unicycle", "truth=c1"], monkeypatch, capsys)
+    assert "truth=c1: a subject brings its own; change values, such as grid.shape" in said

@@ -1,0 +1,313 @@
+"""Configs compose and validate; wrong ones are refused with a clear message, and write nothing."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from refusals import refusal
+from tiny_point import composed
+
+from experiments.config.paths import CONF
+from experiments.config.read import ConfigError, read_config
+from experiments.config.schema import Problems, parse
+from experiments.tracking.points import Point
+
+
+def options(group: str) -> list[str]:
+    return sorted(path.stem for path in (CONF / group).glob("*.yaml"))
+
+
+def identity(*overrides: str) -> str:
+    return Point(read_config(composed(*overrides))[0], Path()).identity
+
+
+def suits(system: str, truth: str) -> bool:
+    """Whether a truth can be inferred with a system: that it stays in bounds and can be ranked."""
+    try:
+        read_config(composed(f"system={system}", f"truth={truth}"))
+    except ConfigError as error:
+        # Anything else that is wrong is for the test to show.
+        if str(error).startswith("truth"):
+            return False
+        raise
+    return True
+
+
+@pytest.mark.parametrize("truth", options("truth"))
+def test_every_truth_suits_a_system(truth: str) -> None:
+    assert any(suits(system, truth) for system in options("system"))
+
+
+@pytest.mark.parametrize("system", options("system"))
+def test_every_system_suits_a_truth(system: str) -> None:
+    assert any(suits(system, truth) for truth in options("truth"))
+
+
+@pytest.mark.parametrize("grid", options("grid"))
+def test_every_grid_has_the_cells_of_its_name(grid: str) -> None:
+    # The telescoping pendulum's cells have four sides.
+    system = ["truth=pain"] if grid == "2500" else []
+    settings, _ = read_config(composed(f"grid={grid}", *system))
+    assert settings.cells.size == settings.columns["cells"] == int(grid)
+
+
+@pytest.mark.parametrize("experiment", options("experiment"))
+def test_every_experiment_names_its_study(experiment: str) -> None:
+    _, study = read_config(composed(f"experiment={experiment}"))
+    assert study.study == experiment
+
+
+def test_defaults_are_the_walk_of_the_paper() -> None:
+    settings, _ = read_config(composed())
+    box = settings.constraint.box(0)
+    assert box.lower == pytest.approx([math.pi, 0])
+    assert box.upper == pytest.approx([6 / 5 * math.pi, 1.2])
+    assert (settings.cells.shape, settings.action_counts, settings.dt) == ((20, 20), (9,), 0.25)
+    assert len(settings.candidates) == 100
+    read = read_config(composed("truth=c2"))[0].constraint.box(0)
+    assert read.lower[0] == pytest.approx(8 / 5 * math.pi)
+    assert read.upper[0] == pytest.approx(9 / 5 * math.pi)
+
+
+@pytest.mark.parametrize(
+    ("words", "value"),
+    [
+        ("pi", 1),
+        ("6/5 pi", 1.2),
+        ("-pi/2", -0.5),
+        ("2pi", 2),
+        ("1.5 * pi", 1.5),
+        ("-3/4 pi", -0.75),
+    ],
+)
+def test_multiples_of_pi_in_words(words: str, value: float) -> None:
+    problems = Problems()
+    assert parse(float, words, "key", problems) == pytest.approx(value * math.pi, rel=1e-15)
+    assert not problems
+
+
+def test_spelling_does_not_change_identity() -> None:
+    same = [
+        identity("dt=1"),
+        identity("dt=1.0", "study=other", "results=elsewhere", "workers=3"),
+        identity("dt=1", "truth.boxes=[{lower:[3.141592653589793,0],upper:['6/5 pi',1.2]}]"),
+        identity("dt=1", "~system.gravity"),
+        identity("dt=1", "grid=100", "grid.shape=[20,20]"),
+    ]
+    assert len(set(same)) == 1
+
+
+def test_every_setting_changes_identity() -> None:
+    settings, _ = read_config(composed())
+
+    def variants(value: object) -> list:
+        """Copies of a nested dataclass, each with one leaf changed."""
+        if not dataclasses.is_dataclass(value):
+            return ["another"]
+        return [
+            dataclasses.replace(value, **{field.name: other})
+            for field in dataclasses.fields(value)
+            for other in variants(getattr(value, field.name))
+        ]
+
+    found = variants(settings)
+    assert len(found) > 30
+    assert len({Point(other, Path()).identity for other in [settings, *found]}) == len(found) + 1
+
+
+CASES = "hydra.sweeper.cases="
+WRONG = [
+    ("dtt=0.2", "dtt: unknown key; did you mean dt?"),
+    ("+dtt=0.2", "dtt: unknown key; did you mean dt?"),
+    ("demonstrations.pars=3", "demonstrations.pars: unknown key; did you mean pairs?"),
+    ("++demonstrations.pars=3", "demonstrations.pars: unknown key; did you mean pairs?"),
+    ("system.gravty=2", "system.gravty: unknown key; did you mean gravity?"),
+    ("+system.gravty=2", "system.gravty: Pendulum has no such argument; did you mean gravity?"),
+    ("system._target_=os.system", "'os.system' is not a subclass of mlci.systems.System"),
+    ("system._target_=mlci.systems.System", "is not a subclass"),
+    ("system._target_=nowhere.Pendulum", "system._target_: 'nowhere.Pendulum' cannot be imported"),
+    ("system.speed_limit=-1", "system: Pendulum.speed_limit must be positive, not -1.0"),
+    ("system.speed_limit=fast", "system.speed_limit: 'fast' is not a finite number"),
+    ("~system._target_", "system._target_: missing"),
+    ("grid=300", "grid: there is no 300; there are 100, 400, 900, 1600, 2500"),
+    ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, pain, wall"),
+    ("grdi=100", "grdi: unknown key; did you mean grid?"),
+    ("dt=[1", "dt=[1: cannot be read as key=value"),
+    ("dt", "dt: cannot be read as key=value"),
+    ("dt=fast", "dt: 'fast' is not a finite number"),
+    ("dt=nan", "dt: nan is not a finite number"),
+    ("dt=true", "dt: True is not a finite number"),
+    ("dt=", "dt: '' is not a finite number"),
+    ("dt=${nothing}", "dt: Interpolation key 'nothing' not found"),
+    ("dt=???", "dt: missing; give it a value"),
+    ("~dt", "dt: missing; give it a value"),
+    ("dt=0.2,0.25", "dt: several values need -m, for a sweep, or dt=[0.2,0.25], for a list"),
+    ("dt=0", "dt: 0.0 must be above 0"),
+    ("dt=0.3", "dt: 0.3 does not cut the horizon 5.0 into whole steps; try 0.25 or 0.3125"),
+    ("dt=7", "dt: 7.0 does not cut the horizon 5.0 into whole steps; try 5"),
+    ("dt=1e-300", "dt: 1e-300 cuts the horizon 5.0 into more than 100000 steps"),
+    ("demonstrations.dt=0.03", "demonstrations.dt: 0.03 does not cut the horizon"),
+    ("seed=-1", "seed: -1 must not be below 0"),
+    ("seed=1.5", "seed: 1.5 is not a whole number"),
+    ("temperature=0", "temperature: 0.0 must be above 0"),
+    ("actions=0", "actions: 0 must be at least 1"),
+    ("actions=[3,4]", "actions: [3, 4] must be one number, or a list of 1"),
+    ("grid.shape=[100000,100000]", "1 samples and these hypotheses takes about 1.22e+04 GB"),
+    ("rollouts=10000000", "rollouts: 10000000 is above 1000000"),
+    ("transition.samples=0", "transition.samples: 0 must be at least 1"),
+    ("inference.prior=1", "inference.prior: 1.0 must lie between 0 and 1"),
+    ("demonstrations.keep=101", "demonstrations.keep: 101 is more than the 100 of"),
+    ("grid.shape=[]", "grid.shape: [] is empty"),
+    ("grid.shape=[0,5]", "grid.shape: [0, 5] must be at least 1"),
+    ("grid.shape=9", "grid.shape: 9 is not a list"),
+    (
+        "grid.shape=[5,6,7]",
+        "grid.shape: [5, 6, 7] must have 2 entries, one each for angle",
+    ),
+    ("system=double_integrator", "truth.boxes[0]: position from 3.14159 to 3.76991 leaves"),
+    ("truth.boxes=[]", "truth.boxes: [] is empty; give at least one box, with lower and upper, or"),
+    ("truth.name=none", "truth.name: none means that nothing is forbidden; take another name"),
+    ("truth.cell=37", "truth.cell: 37 and 1 boxes are given; keep one of them"),
+    ("calibration.sets=-1", "calibration.sets: -1 must not be below 0"),
+    (
+        "calibration.sets=2",
+        "calibration.sets: 2, but the prior knows no such truth; take",
+    ),
+    ("calibration.demonstrations=[]", "calibration.demonstrations: [] is empty"),
+    ("calibration.demonstrations=[0]", "calibration.demonstrations: [0] must be at least 1"),
+    ("truth.cell=-1", "truth.cell: -1 must not be below 0"),
+    ("grid.offset=[0.5]", "grid.offset: [0.5] must have 2 entries, one each for angle"),
+    ("grid.offset=[1,0]", "grid.offset: [1.0, 0.0] must be shares of a cell, from 0 to below 1"),
+    ("grid.offset=[0,0.5]", "grid.offset: [0.0, 0.5] shifts angular_velocity, which has ends"),
+    ("tasks.goal=[0.1]", "tasks.goal: [0.1] must have 2 entries, one each for angle"),
+    ("tasks.goal=[0.1,-1]", "tasks.goal: [0.1, -1.0] must not be below 0"),
+    ("tasks.lower=[null,3.0]", "tasks: angular_velocity goes from 3.0 to 2.0"),
+    ("tasks.crossing=1", "tasks.crossing: 1 is not true or false"),
+    ("safety.method=magic", "safety.method: 'magic' is none of equation, escapes"),
+    ("truth.boxes=[{lower:[0],upper:[1]}]", "truth.boxes[0].lower: [0.0] must have 2 entries"),
+    ("truth.boxes=[{lower:[0,1],upper:[1,0]}]", "angular_velocity goes from 1.0 to 0.0"),
+    ("truth.boxes=[{lower:[0,null],upper:[1,0]}]", "angular_velocity has one side only"),
+    ("truth.boxes=[{lower:[0,1],upper:[7,2]}]", "is over a whole turn; use null twice"),
+    ("truth.boxes=[{lower:[0,1],top:[1,2]}]", "truth.boxes[0].top: unknown key"),
+    ("truth.boxes=[{lower:[3,0],upper:[3.1,1]}]", "truth: c1 covers no hypothesis entirely"),
+    ("hypotheses.shape=null", "hypotheses: no shape and no boxes"),
+    ("study=../x", "study: '../x' cannot name a folder"),
+    ("sweep.time_limit=5", "sweep.time_limit: only a sweep heeds it; add -m, or leave it out"),
+    ("sweep.retries=1", "sweep.retries: only a sweep heeds it"),
+    ("workers=0", "workers: 0 must be at least 1"),
+    ("hydra.run.dirr=x", "hydra.run.dirr: unknown key; did you mean dir?"),
+]
+
+
+@pytest.mark.parametrize(("argument", "message"), WRONG)
+def test_wrong_value_is_refused(
+    argument: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = refusal([argument, "results=results"], monkeypatch, capsys)
+    assert message in said
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"boxes: [1\n", "/truth/mine.yaml, line 2: not valid YAML"),
+        (b"name: a\nname: b\n", "/truth/mine.yaml, line 2: not valid YAML"),
+        (b"name: \xff\n", "/truth/mine.yaml: byte 6 is not UTF-8"),
+        (b"- a\n", "/truth/mine.yaml: holds a list, not keys with values"),
+        (b"", "truth.name: missing"),
+        (b"defaults: 3\n", "Invalid defaults list in 'truth/mine'"),
+    ],
+)
+def test_broken_file_is_refused(
+    content: bytes,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "truth").mkdir()
+    (tmp_path / "truth" / "mine.yaml").write_bytes(content)
+    said = refusal(["--config-dir", str(tmp_path), "truth=mine"], monkeypatch, capsys)
+    assert message in said
+
+
+def test_hypothesis_that_is_the_truth_must_exist(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = refusal(["truth=cell", "truth.cell=100"], monkeypatch, capsys)
+    assert "truth.cell: 100 is not the number of a hypothesis; there are 100, from 0 to 99" in said
+
+
+def test_a_hypothesis_or_nothing_can_be_the_truth() -> None:
+    cell, _ = read_config(composed("truth=cell", "truth.cell=37"))
+    assert cell.columns["truth"] == "cell_37"
+    assert np.flatnonzero(cell.candidates.inside(cell.constraint)).tolist() == [37]
+    assert np.flatnonzero(cell.constraint.inside(cell.candidates)).tolist() == [0]
+    nothing, _ = read_config(composed("truth=none"))
+    assert nothing.columns["truth"] == "none"
+    assert len(nothing.constraint) == 0
+    one, other = identity("truth=cell", "truth.cell=1"), identity("truth=cell", "truth.cell=2")
+    assert one != other
+
+
+def test_tasks_cannot_cross_what_is_not_there(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = refusal(["truth=none", "tasks.crossing=true"], monkeypatch, capsys)
+    assert "tasks.crossing: true, but no truth is there to cross; set it to false" in said
+
+
+def test_all_wrong_points_of_a_sweep_are_reported_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["-m", "dt=0.25,0.3", "actions=0,5", f"results={tmp_path}"]
+    said = refusal(arguments, monkeypatch, capsys)
+    assert "actions: 0 must be at least 1 [2 of 4 points, such as dt=0.25 actions=0]" in said
+    assert "dt: 0.3 does not cut" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["-m", "grid=100,300"],
+            "grid: there is no 300; there are 100, 400, 900, 1600, 2500 [1 of 2",
+        ),
+        (["-m", "experiment=paper,other"], "experiment=paper,other: a sweep over experiments"),
+        (["-m", "study=a,b"], "study=a,b: this changes no result"),
+        (["-m", "dt=interval(0,1)"], "dt=interval(0,1): cannot be swept; list its values"),
+        (["experiment=paper", "hydra.mode=RUN"], "experiment: this one describes a sweep; add -m"),
+        ([f"{CASES}[[]]"], "experiment: this one describes a sweep; add -m"),
+        (["-m", f"{CASES}3"], "hydra.sweeper: cases: 3 is no list of lists of overrides"),
+        (["-m", f"{CASES}[[],seed]"], "hydra.sweeper: cases[1]: 'seed' is no list of overrides, s"),
+        (["-m", f"{CASES}[[3]]"], "hydra.sweeper: cases[0]: [3] is no list of overrides, such as"),
+        (["-m", f"{CASES}[[],[seed]]"], "sweeper.cases[1]: seed cannot be read as key=value"),
+        (["-m", f"{CASES}[['dt=interval(0,1)']]"], "dt=interval(0,1): cannot be swept; list its"),
+        (["-m", f"{CASES}[['study=x']]"], "cases[0]: study=x: this changes no result, so give"),
+        (["-m", f"{CASES}[['seed=1','seed=2']]"], "cases[0]: seed=2 is the second value of seed"),
+        (
+            ["-m", "experiment=paper", f"{CASES}[[],['dt=0.5']]"],
+            "hydra.sweeper.cases[1]: dt=0.5: params sweep dt too; leave it to one of them",
+        ),
+        (
+            ["-m", "dt=0.5,1.0", f"{CASES}[[],['sed=1']]"],
+            "sed: unknown key; did you mean seed? [2 of 4 points, such as dt=0.5 sed=1]",
+        ),
+    ],
+)
+def test_sweep_that_cannot_be_is_refused(
+    arguments: list[str],
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert message in refusal(arguments, monkeypatch, capsys)

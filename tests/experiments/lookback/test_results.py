@@ -1,0 +1,400 @@
+"""Looking back: what the command line tells of a folder of results, and what it removes."""
+
+import csv
+import dataclasses
+import io
+import json
+import os
+import re
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from tiny_point import hopeless
+
+from experiments import results
+from experiments.collate.join import collate
+from experiments.config.settings import Settings
+from experiments.sweep import attempts as attempt
+from experiments.tracking.points import Point
+from experiments.tracking.study import write_plan
+from paper_figures.figure_notes import figure_note, write_note
+
+TABLES = (
+    "attempts, dimensions, first, hypotheses, moves, paths, probabilities, ranks, regions, "
+    "sampled, summary, trials, violations"
+)
+
+
+def finished(settings: Settings, folder: Path, **changes: object) -> Point:
+    point = Point(dataclasses.replace(settings, **changes), folder)
+    attempt.run(point, print)
+    return point
+
+
+def swept(settings: Settings, folder: Path, study: str, **values: float) -> list[Point]:
+    """A study of finished points, collated."""
+    points = [finished(settings, folder, dt=dt, seed=values.get("seed", 0)) for dt in (1.0, 0.5)]
+    write_plan(folder / study, [(point, [f"dt={point.settings.dt}"]) for point in points])
+    collate(points, folder / study)
+    return points
+
+
+def outdate(point: Point) -> None:
+    """Leave a finished point as an older version of the source would have."""
+    path = point.folder / "record.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "source": "another"}))
+
+
+def spelt(table: Path) -> list[dict[str, str]]:
+    """The rows of a table on disk, every value as it is spelt there."""
+    parquet = table.suffix == ".parquet"
+    text = pd.read_parquet(table).to_csv(index=False) if parquet else table.read_text()
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def summary(point: Point) -> dict[str, str]:
+    """The point's own summary."""
+    (only,) = spelt(point.folder / "summary.csv")
+    return only
+
+
+def ask(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, folder: Path, *words: str
+) -> tuple[int, str, str]:
+    """Exit status and output of the command line."""
+    capsys.readouterr()
+    monkeypatch.setattr(sys, "argv", ["results", *words, "--results", str(folder)])
+    status = results.main()
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+@pytest.fixture
+def look(capsys, monkeypatch, tmp_path):
+    return lambda *words: ask(capsys, monkeypatch, tmp_path, *words)
+
+
+def row(text: str, start: str) -> list[str]:
+    """The words of the line that starts so."""
+    return next(line.split() for line in text.splitlines() if line.startswith(start))
+
+
+def test_every_state_is_counted(settings: Settings, tmp_path: Path, look) -> None:
+    done, stale = swept(settings, tmp_path, "s")
+    outdate(stale)
+    failed = Point(dataclasses.replace(hopeless(settings), dt=0.25), tmp_path)
+    with pytest.raises(RuntimeError, match="no demonstration was kept"):
+        attempt.run(failed, print)
+    running = Point(dataclasses.replace(settings, dt=0.2), tmp_path)
+    running.folder.mkdir()
+    missing = Point(dataclasses.replace(settings, dt=0.1), tmp_path)
+    points = [done, stale, failed, running, missing]
+    write_plan(tmp_path / "s", [(point, [f"dt={point.settings.dt}"]) for point in points])
+    tables = sorted(path.name for path in (tmp_path / "s" / "tables").iterdir())
+    assert {path.name for path in done.folder.glob("*.csv")} < set(tables)
+    with running.lock:
+        status, out, _ = look("list")
+        assert status == 0
+        assert row(out, "study") == [
+            *("study", "points", "done", "stale", "failed", "running", "missing", "tables")
+        ]
+        assert row(out, "s ") == ["s", "5", "1", "1", "1", "1", "1", str(len(tables))]
+        _, out, _ = look("list", "s")
+        for point, state in zip(
+            points, ["done", "stale", "failed", "running", "missing"], strict=True
+        ):
+            line = row(out, point.identity[:12])
+            assert line[1:3] == [state, f"dt={point.settings.dt}"]
+        _, out, _ = look("list", "s", "--state", "failed", "--state", "stale")
+        assert [line.split()[0] for line in out.splitlines()[1:]] == [
+            stale.identity[:12],
+            failed.identity[:12],
+        ]
+    _, out, _ = look("show", failed.identity[:12])
+    assert "RuntimeError: no demonstration was kept" in out
+    assert out.count("Traceback") == 2  # of the failure, and in the log
+
+
+@pytest.mark.parametrize(
+    ("conditions", "dts"),
+    [
+        (["dt<=0.5"], [0.5]),
+        (["dt>0.5"], [1.0]),
+        (["dt=1,0.5"], [0.5, 1.0]),
+        (["dt!=1"], [0.5]),
+        (["truth=wall", "cells>=96", "actions=3"], [0.5, 1.0]),
+        (["grid.shape=[12,8]", "truth.name=wall", "cells_crossed<2"], [0.5]),
+        (["system.target=mlci.systems.DoubleIntegrator", "dt<1"], [0.5]),
+        (["safety.margin=null", "dt>=1"], [1.0]),
+    ],
+)
+def test_query_finds_by_config_and_summary(
+    conditions: list[str], dts: list[float], settings: Settings, tmp_path: Path, look
+) -> None:
+    points = swept(settings, tmp_path, "s")
+    crossed = {point.settings.dt: float(summary(point)["cells_crossed"]) for point in points}
+    assert crossed[0.5] < 2 < crossed[1.0]
+    status, out, _ = look("query", *conditions)
+    assert status == 0
+    for point in points:
+        assert (point.identity[:12] in out) == (point.settings.dt in dts)
+
+
+def test_show_tells_config_record_and_results(settings: Settings, tmp_path: Path, look) -> None:
+    points = swept(settings, tmp_path, "s")
+    status, out, _ = look("show", points[0].identity[:9])
+    assert status == 0
+    assert row(out, "  grid.shape") == ["grid.shape", "[12,", "8]"]
+    assert row(out, "  packages.numpy") == ["packages.numpy", np.__version__]
+    error = summary(points[0])["final_state_error"]
+    assert 0 < float(error) < 1
+    assert row(out, "  final_state_error") == ["final_state_error", error]
+    log = (points[0].folder / "log.txt").read_text().splitlines()
+    assert log[0].startswith("demonstrations  4 of 6 kept")
+    assert out.splitlines()[-len(log) - 1 :] == ["log", *(f"  {line}" for line in log)]
+    _, out, _ = look("show", "s")
+    assert "s: 2 points: 2 done" in out
+    assert row(out, "  dt ") == ["dt", "1.0,", "0.5"]
+
+
+def test_diff_shows_what_differs_and_nothing_else(settings: Settings, tmp_path: Path, look) -> None:
+    one, two = swept(settings, tmp_path, "s")
+    path = two.folder / "record.json"
+    record = json.loads(path.read_text())
+    path.write_text(json.dumps({**record, "python": "3.99", "peak_memory_mb": 1}))
+    status, out, _ = look("diff", one.identity[:12], two.identity[:12])
+    assert status == 0
+    assert "config: 1 differs" in out
+    assert row(out, "  dt") == ["dt", "1.0", "0.5"]
+    assert row(out, "  python")[2] == "3.99"
+    errors = [summary(point)["final_state_error"] for point in (one, two)]
+    assert errors[0] != errors[1]
+    assert row(out, "  final_state_error") == ["final_state_error", *errors]
+    assert "trials.csv" in out
+    assert "attempts.csv" not in out
+    assert summary(one)["pairs"] == summary(two)["pairs"]
+    assert "  pairs" not in out
+    assert "grid.shape" not in out
+    assert "packages.numpy" not in out
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_export_is_one_exact_table(form: str, settings: Settings, tmp_path: Path, look) -> None:
+    points = swept(settings, tmp_path, "s")
+    out = tmp_path / f"all.{form}"
+    status, text, _ = look("export", "s", "--format", form, "--out", str(out))
+    assert status == 0
+    assert "2 rows" in text
+    table = pd.read_csv(out) if form == "csv" else pd.read_parquet(out)
+    assert table["point"].tolist() == [point.identity for point in points]
+    assert table["config.dt"].tolist() == table["dt"].tolist() == [1.0, 0.5]
+    assert set(table["state"]) == {"done"}
+    assert all(0 < error < 1 for error in table["final_state_error"].tolist())
+    assert_holds(out, [point.folder / "summary.csv" for point in points])
+    look("export", "s", "--format", form, "--out", str(out), "--table", "trials")
+    assert_holds(out, [point.folder / "trials.csv" for point in points])
+
+
+def assert_holds(table: Path, parts: list[Path]) -> None:
+    """The table's rows are exactly those of its parts, in turn, beside other columns."""
+    rows = [row for part in parts for row in spelt(part)]
+    assert len({row["final_state_error"] for row in rows} - {""}) > 1
+    assert [{key: line[key] for key in rows[0]} for line in spelt(table)] == rows
+
+
+def test_export_to_the_terminal_is_csv(settings: Settings, tmp_path: Path, look) -> None:
+    swept(settings, tmp_path, "s")
+    _, out, _ = look("export", "s")
+    assert len(pd.read_csv(io.StringIO(out))) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["status", "smoek"], "did you mean smoke?"),
+        (["show", "zz"], "no such study or point"),
+        (["show", "0" * 31], "no such study or point"),
+        (["list", "smoek"], "did you mean smoke?"),
+        (["export", "smoke", "--table", "trails"], f"no such table; there are {TABLES}"),
+        (["export", "smoke", "--format", "parquet"], "needs --out"),
+        (["diff", "smoke", "smoke"], "is a study"),
+        (["query", "dtt=1"], "did you mean dt?"),
+        (["query", "dt<"], "cannot be read"),
+        (["query", "dt=7"], "no finished point has dt=7"),
+        (["query", "dt!=1,0.5"], "no finished point has dt!=1,0.5"),
+    ],
+)
+def test_mistakes_are_told_in_a_line(
+    words: list[str], told: str, settings: Settings, tmp_path: Path, look
+) -> None:
+    swept(settings, tmp_path, "smoke")
+    status, out, err = look(*words)
+    assert status == 2
+    assert out == ""
+    assert told in err
+    assert len(err.splitlines()) == 1
+
+
+def test_beginning_of_several_points_is_refused(settings: Settings, tmp_path: Path, look) -> None:
+    for name in ("abc1", "abc2"):
+        (tmp_path / "points" / name).mkdir(parents=True)
+    status, _, err = look("show", "abc")
+    assert status == 2
+    assert "2 points begin so" in err
+
+
+def everything(folder: Path) -> set[Path]:
+    return {path for path in folder.rglob("*") if path.is_file()}
+
+
+def test_clean_removes_what_no_study_uses_and_only_when_told(
+    settings: Settings, tmp_path: Path, look
+) -> None:
+    swept(settings, tmp_path, "s")
+    old, new = tmp_path / "s" / "tables" / ".a.csv-x.part", tmp_path / "store" / ".b-y.part"
+    for path in (old, new):
+        path.write_text("half")
+    os.utime(old, (time.time() - 7200,) * 2)
+    used = everything(tmp_path) - {old}
+    loose = finished(settings, tmp_path, seed=5)
+    before = everything(tmp_path)
+    status, out, _ = look("clean")
+    assert status == 0
+    assert everything(tmp_path) == before
+    assert f"unused: point {loose.identity[:12]}, in no study" in out
+    stored = json.loads((loose.folder / "record.json").read_text())["stages"]["demonstrations"]
+    assert f"unused: stored demonstrations {stored[:12]}" in out
+    assert out.count("unused:") == 3
+    look("clean", "--yes")
+    assert everything(tmp_path) == used
+    assert not loose.folder.exists()
+    _, out, _ = look("clean", "--yes")
+    assert out == "nothing to clean\n"
+
+
+def test_clean_keeps_a_running_point_and_then_the_store(
+    settings: Settings, tmp_path: Path, look
+) -> None:
+    swept(settings, tmp_path, "s")
+    loose = finished(settings, tmp_path, seed=5)
+    before = everything(tmp_path)
+    with loose.lock:
+        _, out, _ = look("clean")
+        assert "unused" not in out
+        _, out, _ = look("clean", "--yes")
+    assert "it is running" in out
+    assert everything(tmp_path) >= before
+
+
+def test_clean_keeps_points_of_old_tables_and_the_store_of_unfinished_studies(
+    settings: Settings, tmp_path: Path, look
+) -> None:
+    swept(settings, tmp_path, "s")
+    missing = Point(dataclasses.replace(settings, dt=0.1), tmp_path)
+    write_plan(tmp_path / "s", [(missing, ["dt=0.1"])])
+    loose = finished(settings, tmp_path, seed=5)
+    before = everything(tmp_path)
+    _, out, _ = look("clean", "--yes")
+    assert "the store is kept" in out
+    assert before - everything(tmp_path) == set(
+        path for path in before if loose.folder in path.parents
+    )
+
+
+def test_clean_refuses_when_it_cannot_know(settings: Settings, tmp_path: Path, look) -> None:
+    swept(settings, tmp_path, "s")
+    finished(settings, tmp_path, seed=5)
+    (tmp_path / "s" / "study.json").write_text("{")
+    before = everything(tmp_path)
+    status, _, err = look("clean", "--yes")
+    assert status == 2
+    assert "study.json cannot be read" in err
+    assert everything(tmp_path) == before
+    status, out, _ = look("list")
+    assert status == 0
+    assert "study.json cannot be read" in out
+
+
+def drawn(folder: Path) -> None:
+    """A figure of the table `trials`, as far as its note goes."""
+    (folder / "figures").mkdir()
+    for suffix in ("png", "pdf", "txt"):
+        (folder / "figures" / f"curve.{suffix}").write_text("drawn")
+    data = (folder / "tables" / "trials.csv").read_bytes()
+    note = figure_note(folder / "figures" / "curve", "rank_curve", {"trials.csv": data})
+    write_note(folder, {"curve": note})
+
+
+def test_status_is_up_to_date_after_a_sweep(settings: Settings, tmp_path: Path, look) -> None:
+    swept(settings, tmp_path, "s")
+    _, out, _ = look("status")
+    assert "figures not drawn" in out
+    drawn(tmp_path / "s")
+    status, out, _ = look("status", "s")
+    assert status == 0
+    assert out.splitlines() == [
+        "s: 2 points: 2 done",
+        "  tables  up to date",
+        "  figure  curve: up to date",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("harm", "tables", "figure"),
+    [
+        ("alter", "table trials.csv was changed", "table trials.csv has changed since"),
+        ("remove", "table trials.csv is missing", "table trials.csv is missing"),
+        ("unplot", None, "curve.pdf is missing"),
+        ("retype", None, "curve.txt was changed after it was drawn"),
+        ("edit", None, "the code that draws has changed since"),
+        ("stale", "2 points are stale", "2 points are stale"),
+        ("rerun", "points have run again since", None),
+        ("replan", "other points than the study's last sweep", "1 point is missing"),
+    ],
+)
+def test_status_tells_why_not(
+    harm: str,
+    tables: str | None,
+    figure: str | None,
+    settings: Settings,
+    tmp_path: Path,
+    look,
+) -> None:
+    points = swept(settings, tmp_path, "s")
+    drawn(tmp_path / "s")
+    table = tmp_path / "s" / "tables" / "trials.csv"
+    if harm == "alter":
+        table.write_text(table.read_text() + "1\n")
+    elif harm == "remove":
+        table.unlink()
+    elif harm == "unplot":
+        (tmp_path / "s" / "figures" / "curve.pdf").unlink()
+    elif harm == "retype":
+        (tmp_path / "s" / "figures" / "curve.txt").write_text("by hand")
+    elif harm == "edit":
+        note = tmp_path / "s" / "figures" / "figures.json"
+        note.write_text(
+            re.sub('"drawn_by": "[0-9a-f]+"', '"drawn_by": "another"', note.read_text())
+        )
+    elif harm == "stale":
+        for point in points:
+            outdate(point)
+        collate(points, tmp_path / "s")
+    elif harm == "rerun":
+        attempt.run(points[0], print, force=True)
+    else:
+        missing = Point(dataclasses.replace(settings, dt=0.1), tmp_path)
+        write_plan(tmp_path / "s", [(missing, [])])
+    _, out, _ = look("status")
+    for start, told in (("  tables", tables), ("  figure", figure)):
+        line = next(line for line in out.splitlines() if line.startswith(start))
+        if told is None:
+            assert line.endswith("up to date")
+            assert "not up to date" not in line
+        else:
+            assert "not up to date: " in line
+            assert told in line

@@ -1,0 +1,230 @@
+"""Sweeps as a user runs them: parallel, resumed, failing and stopped."""
+
+import json
+import os
+import re
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from sweeps import faulty, gone, run, running, start, tables
+
+
+def test_tables_do_not_depend_on_workers_order_or_repetition(tmp_path: Path) -> None:
+    one, two = tmp_path / "one", tmp_path / "two"
+    one.mkdir()
+    two.mkdir()
+    status, out, err = run(one, "-m", "dt=0.5,1.0", "actions=2,3", "study=s", "workers=2")
+    assert status == 0, err
+    assert "4 points: 4 missing; 4 to run" in out
+    status, out, err = run(two, "-m", "actions=3,2,3", "dt=1,0.5", "study=s", "workers=1")
+    assert status == 0, err
+    assert "2 of 6 combinations repeat others" in out
+    assert "4 points: 4 missing; 4 to run" in out
+    assert tables(one, "s") == tables(two, "s")
+    # Nothing but results was written, and nothing is run twice.
+    assert [path.name for path in two.iterdir()] == ["results"]
+    status, out, _ = run(two, "-m", "dt=0.5,1.0", "actions=2,3", "study=again")
+    assert status == 0
+    assert "4 points: 4 done; 0 to run" in out
+    assert tables(one, "s") == tables(two, "again")
+
+
+def test_single_run_shows_its_log_again_when_it_was_finished(tmp_path: Path) -> None:
+    status, first, _ = run(tmp_path)
+    assert status == 0
+    assert "written: " in first
+    status, second, _ = run(tmp_path, "study=another")
+    assert status == 0
+    assert second.splitlines()[:-1] == first.splitlines()[:-1]
+    assert "finished before: " in second
+
+
+def failure_table(err: str) -> list[list[str]]:
+    """Reason, point and message of each row at the end."""
+    rows = err[err.index("points failed, and no table is written") :].splitlines()[1:]
+    return [row.split(maxsplit=2) for row in rows]
+
+
+def records(folder: Path) -> list[dict]:
+    paths = (folder / "results" / "points").glob("*/record.json")
+    return [json.loads(path.read_bytes()) for path in paths]
+
+
+def test_failed_points_fail_alone_and_are_run_again_when_asked(tmp_path: Path) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=raise,none,exit,crash,hang,full,warn"]
+    sweep += ["study=s", "sweep.time_limit=2"]
+    status, out, err = run(tmp_path, *sweep)
+    assert status == 1
+    assert "7 points: 7 missing; 7 to run" in out
+    assert "5 of 7 points failed" in err
+    table = failure_table(err)
+    name = "+system.fault="
+    assert [row[:2] for row in table] == [
+        ["raised", f"{name}raise"],
+        ["died", f"{name}exit"],
+        ["died", f"{name}crash"],
+        ["timeout", f"{name}hang"],
+        ["raised", f"{name}full"],
+    ]
+    assert table[0][2] == "ArithmeticError: the mass fell off its line"
+    assert table[1][2] == "ChildProcessError: the worker process ended with 3"
+    assert table[2][2] == "ChildProcessError: the worker process was killed by SIGABRT"
+    assert table[3][2] == "still running at its time limit"
+    assert table[4][2] == "OSError: [Errno 27] File too large"
+    # Where each of them was, whether it could still say so itself or not.
+    for where in [
+        'raise ArithmeticError("the mass',
+        "Fatal Python error: Abort",
+        "Timeout (0:00:02)",
+    ]:
+        assert where in err
+    assert len(re.findall(r"in dynamics", err)) == 3
+    assert not list((tmp_path / "results").rglob("*.part"))
+    assert not list((tmp_path / "results" / "s").rglob("*.csv"))
+    logs = [path.read_text() for path in (tmp_path / "results" / "points").glob("*/log.txt")]
+    assert sum("from another program" in log and "the mass wobbles" in log for log in logs) == 1
+    assert "wobbles" not in out + err
+
+    status, out, err = run(tmp_path, *sweep, "sweep.only=[missing,stale]")
+    assert status == 0
+    assert "7 points: 2 done, 5 failed; 0 to run" in out
+    assert "5 of 7 points are left, and no table is written" in out
+    (tmp_path / "healed").touch()
+    status, out, err = run(tmp_path, *sweep, "sweep.only=[failed]", "sweep.limit=1")
+    assert status == 0
+    assert "7 points: 2 done, 5 failed; 1 to run" in out
+    status, out, err = run(tmp_path, *sweep)
+    assert status == 0, err
+    assert "7 points: 3 done, 4 failed; 4 to run" in out
+    assert sorted(record["attempt"] for record in records(tmp_path)) == [1, 1, 2, 2, 2, 2, 2]
+    assert not list((tmp_path / "results").rglob("failure.json"))
+
+
+def test_first_failure_stops_a_sweep_that_fails_fast(tmp_path: Path) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=raise,none", "seed=0,1,2", "workers=1"]
+    status, out, err = run(tmp_path, *sweep, "sweep.fail_fast=true")
+    assert status == 1
+    assert "1 of 6 points failed" in err
+    assert err.splitlines()[-1] == "5 points were not started"
+    status, out, err = run(tmp_path, *sweep, "sweep.retries=1", "sweep.limit=1")
+    assert status == 1
+    assert "6 points: 1 failed, 5 missing; 1 to run" in out
+    failure = next((tmp_path / "results" / "points").glob("*/failure.json"))
+    assert json.loads(failure.read_bytes())["attempt"] == 3
+
+
+def test_dry_run_shows_states_and_writes_nothing(tmp_path: Path) -> None:
+    status, out, err = run(tmp_path, "-m", "dt=0.5,1.0", "sweep.dry_run=true", "sweep.limit=1")
+    assert status == 0, err
+    header, first, second = out.splitlines()
+    assert header == "2 points: 2 missing; 1 to run"
+    assert re.fullmatch(r"run missing +[0-9a-f]{8}  dt=0.5", first)
+    assert re.fullmatch(r"    missing +[0-9a-f]{8}  dt=1.0", second)
+    assert not list(tmp_path.iterdir())
+
+
+def listed(folder: Path, *arguments: str) -> list[str]:
+    """The names of the points that a sweep would run."""
+    status, out, err = run(folder, "-m", "sweep.dry_run=true", *arguments)
+    assert status == 0, err
+    return [line.partition("  ")[2] for line in out.splitlines() if line.startswith("run ")]
+
+
+def test_each_case_joins_each_combination(tmp_path: Path) -> None:
+    cases = "hydra.sweeper.cases=[[],['temperature=2'],['safety.width=0.1','seed=3']]"
+    ends = ["", " temperature=2", " safety.width=0.1 seed=3"]
+    assert listed(tmp_path, cases) == ["defaults", *(end.strip() for end in ends[1:])]
+    swept = [f"dt={dt}{end}" for dt in (0.5, 1.0) for end in ends]
+    assert listed(tmp_path, "dt=0.5,1.0", cases) == swept
+    assert listed(tmp_path, "dt=0.5,1.0", cases.replace("seed=3", "seed=3,4")) == [
+        name for name in swept for name in ([name, name[:-1] + "4"] if "seed" in name else [name])
+    ]
+    # The command line wins, over one key of a case as over a swept one.
+    names = [f"seed={seed}{end.removesuffix(' seed=3')}" for seed in (4, 5) for end in ends]
+    assert listed(tmp_path, cases, "seed=4,5") == names
+
+
+def test_cases_of_an_experiment_stay_whole_at_smoke_scale(tmp_path: Path) -> None:
+    (tmp_path / "experiment").mkdir()
+    (tmp_path / "experiment" / "mine.yaml").write_text(
+        """# @package _global_
+study: mine
+hydra:
+  mode: MULTIRUN
+  sweeper:
+    params:
+      temperature: 1,2,3
+    cases:
+      - []
+      - [seed=1]
+      - [grid=100, "tasks.lower=[null,-0.5]"]
+      - ["seed=2,3,4", "case='some seeds: a few'"]
+"""
+    )
+    words = ["experiment=mine", f"--config-dir={tmp_path}"]
+    cases = ["", " seed=1", " grid=100 tasks.lower=[null,-0.5]"]
+    for scale, values, seeds in (([], (1, 2, 3), (2, 3, 4)), (["scale=smoke"], (1, 3), (2, 4))):
+        found = listed(tmp_path, *scale, *words)
+        every = [*cases, *(f" seed={seed} case=some seeds: a few" for seed in seeds)]
+        assert found == [f"temperature={value}{case}" for value in values for case in every]
+
+
+def test_forced_point_runs_again(tmp_path: Path) -> None:
+    assert run(tmp_path, "-m", "study=s")[0] == 0
+    before = tables(tmp_path, "s")
+    status, out, _ = run(tmp_path, "-m", "study=s", "sweep.force=true")
+    assert status == 0
+    assert "1 points: 1 done; 1 to run" in out
+    assert [record["attempt"] for record in records(tmp_path)] == [2]
+    assert tables(tmp_path, "s") == before
+
+
+def test_two_sweeps_at_once_share_the_points(tmp_path: Path) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=slow", "seed=0,1,2,3,4,5"]
+    both = [start(tmp_path, *sweep, f"study={name}", "workers=2") for name in ("a", "b")]
+    outputs = [process.communicate(timeout=120) for process in both]
+    assert [process.returncode for process in both] == [0, 0], outputs
+    assert [record["attempt"] for record in records(tmp_path)] == [1] * 6
+    assert tables(tmp_path, "a") == tables(tmp_path, "b")
+
+
+def test_resumes_after_its_processes_were_killed(tmp_path: Path) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=none,hang", "workers=2", "study=s"]
+    process = start(tmp_path, *sweep)
+    while not (records(tmp_path) and list(tmp_path.rglob("attempt.json"))):
+        time.sleep(0.1)
+        assert process.poll() is None
+    process.kill()
+    process.communicate(timeout=20)
+    assert gone(process.pid, patience=10)  # one may be starting, and looks when it has started
+    (tmp_path / "healed").touch()
+    status, out, err = run(tmp_path, *sweep)
+    assert status == 0, err
+    assert "2 points: 1 done, 1 missing; 1 to run" in out
+    assert sorted(record["attempt"] for record in records(tmp_path)) == [1, 2]
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(
+    stop: signal.Signals, tmp_path: Path
+) -> None:
+    wrong = faulty(tmp_path)
+    process = start(tmp_path, "-m", *wrong, "+system.fault=none,hang", "workers=2")
+    assert running(process.pid)
+    points = tmp_path / "results" / "points"
+    while not list(points.glob("*/record.json")) and process.poll() is None:
+        time.sleep(0.1)
+    if stop is signal.SIGINT:
+        os.killpg(process.pid, stop)  # as a terminal does, workers included
+    else:
+        process.send_signal(stop)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "stopped; what has finished is kept" in err
+    assert "Traceback" not in err
+    assert gone(process.pid)
+    status, out, _ = run(tmp_path, "-m", *wrong, "+system.fault=none")
+    assert status == 0
+    assert "1 points: 1 done; 0 to run" in out

@@ -1,0 +1,138 @@
+"""The SLURM launcher, with stand-ins for the commands of SLURM; the real ones: tests/stress."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from sweeps import faulty, run, tables
+
+SBATCH = """
+import os, re, subprocess, sys
+script = open(sys.argv[-1]).read()
+indices = re.search(r"--array=0-(\\d+)", script)
+with open(os.environ["FAKE_QUEUE"], "w") as queue:
+    for i in range(0 if "DEAD_NODES" in os.environ else int(indices[1]) + 1):
+        own = {"SLURM_JOB_ID": f"{8 + i}", "SLURM_ARRAY_JOB_ID": "7", "SLURM_ARRAY_TASK_ID": f"{i}",
+               "SLURM_PROCID": "0", "SLURM_LOCALID": "0", "SLURM_NODEID": "0", "SLURM_NTASKS": "1",
+               "SLURM_JOB_NUM_NODES": "1", "SLURM_JOB_NODELIST": "here"}
+        job = subprocess.Popen(["bash", "-c", script], env={**os.environ, **own},
+                               start_new_session=True, stdin=subprocess.DEVNULL,
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        print(f"7_{i}", job.pid, file=queue)
+print("Submitted batch job 7")
+"""
+SQUEUE = """
+import os, pathlib
+for line in open(os.environ["FAKE_QUEUE"]):
+    name, pid = line.split()
+    try:
+        state = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()[0]
+    except OSError:
+        continue
+    if state not in "ZX":
+        print(name)
+"""
+SRUN = """
+import os, sys
+first = next(i for i, word in enumerate(sys.argv) if i and "python" in word and word[0] == "/")
+os.execv(sys.argv[first], sys.argv[first:])
+"""
+DEADLY = """
+import os, signal
+from dataclasses import dataclass
+from pathlib import Path
+from mlci.systems import DoubleIntegrator
+
+@dataclass(frozen=True, eq=False)
+class Deadly(DoubleIntegrator):
+    deadly: bool = False
+
+    def dynamics(self, states, controls):
+        if self.deadly and len(states) > 10 and not Path("healed").exists():
+            os.killpg(os.getpgid(0), signal.SIGKILL)
+        return super().dynamics(states, controls)
+"""
+SCANCEL = "import sys\nassert sys.argv[1:] == ['7']\n"
+
+
+@pytest.fixture
+def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Commands that run jobs at once, and the options that use them."""
+    for name, code in {
+        "sbatch": SBATCH,
+        "squeue": SQUEUE,
+        "srun": SRUN,
+        "scancel": SCANCEL,
+    }.items():
+        path = tmp_path / "bin" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f"#!{sys.executable}\n{code}")
+        path.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:{os.environ['PATH']}")
+    monkeypatch.setenv("FAKE_QUEUE", str(tmp_path / "queue"))
+    return ["hydra/launcher=slurm", "hydra.launcher.jobs=2", "hydra.launcher.poll=0.2"]
+
+
+def test_killed_job_fails_alone_and_is_resumed(cluster: list[str], tmp_path: Path) -> None:
+    (tmp_path / "deadly.py").write_text(DEADLY)
+    own = ["system._target_=deadly.Deadly", "dt=0.5,1.0", "+system.deadly=false,true"]
+    sweep = ["-m", *own, "study=s"]
+    status, out, err = run(tmp_path, *sweep, *cluster)
+    assert status == 1, out + err
+    assert "2 SLURM jobs, 7_0 to 7_1" in out
+    assert "2 of 4 points failed" in err
+    assert err.count("no result; its log is in") == 2
+    assert len(list((tmp_path / "results" / "points").glob("*/record.json"))) == 2
+    assert not list((tmp_path / "results").rglob("*.pkl"))
+    (tmp_path / "healed").touch()
+    status, out, err = run(tmp_path, *sweep, *cluster)
+    assert status == 0, out + err
+    assert "4 points: 2 done, 2 failed; 2 to run" in out
+    status, out, err = run(tmp_path, *sweep, f"results={tmp_path / 'local' / 'results'}")
+    assert status == 0, out + err
+    assert tables(tmp_path, "s") == tables(tmp_path / "local", "s")
+
+
+def test_job_that_dies_before_its_points_start_passes_for_nothing_earlier(
+    cluster: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=none,raise", "study=s"]
+    status, _, err = run(tmp_path, *sweep)
+    assert status == 1
+    assert "ArithmeticError" in err
+    done, failed = (
+        next((tmp_path / "results" / "points").glob(f"*/{name}.json"))
+        for name in ("record", "failure")
+    )
+    before = done.read_bytes()
+    monkeypatch.setenv("DEAD_NODES", "")
+    status, out, err = run(tmp_path, *sweep, *cluster, "sweep.force=true")
+    assert status == 1, out + err
+    assert "2 of 2 points failed" in err
+    assert err.count("no result; its log is in") == 2
+    assert "ArithmeticError" not in err
+    failure = json.loads(failed.read_bytes())
+    assert (failure["attempt"], failure["reason"], failure["started"]) == (2, "died", None)
+    # The old result is whole, and is kept.
+    assert done.read_bytes() == before
+    assert not (done.parent / "failure.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("sweep.fail_fast=true", "sweep.fail_fast: a cluster starts jobs by itself"),
+        ("dt=0.5", "hydra/launcher: slurm needs sbatch"),
+    ],
+)
+def test_sweep_that_no_cluster_can_run_is_refused(
+    option: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    status, _, err = run(tmp_path, "-m", "hydra/launcher=slurm", option)
+    assert status == 2
+    assert message in err
+    assert "Traceback" not in err
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,51 @@
+"""Commands as a shell starts them: stopped while their modules are imported."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from sweeps import gone
+
+from experiments.config.paths import CHECKOUT
+
+# A command, and a word in the name of the first module that takes time.
+COMMANDS = {
+    "run": (["experiments/run.py", "-m", "truth=c1,c2"], "hydra"),
+    "infer": (["experiments/infer.py", "demonstrations=none"], "hydra"),
+    "results": (["experiments/results.py", "status"], "argparse"),
+    "figures": (["-m", "paper_figures"], "argparse"),
+    "report": (["-m", "paper_report"], "argparse"),
+}
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.03, 0.1, 0.2])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_ctrl_c_while_modules_are_imported_ends_a_command_quietly(
+    name: str, delay: float, tmp_path: Path
+) -> None:
+    (first, *words), imported = COMMANDS[name]
+    first = first if first == "-m" else str(CHECKOUT / first)
+    process = subprocess.Popen(
+        [sys.executable, "-X", "importtime", first, *words],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    assert process.stderr is not None
+    while imported not in process.stderr.readline():
+        assert process.poll() is None
+    time.sleep(delay)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    told = [line for line in err.splitlines() if not line.startswith("import time:")]
+    assert (process.returncode, out, told) == (130, "", [])
+    assert gone(process.pid)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,143 @@
+"""The command for recorded demonstrations, on files that are written here."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.config.paths import CHECKOUT
+from mlci.demonstrations import Demonstration
+from mlci.demonstrator import Outcome, demonstrate, sample_trials
+from mlci.grids import Grid
+from mlci.reachability import solve
+from mlci.recordings.read import write_demonstration
+from mlci.regions import ConstraintSet
+from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.spaces import Box
+from mlci.systems import Pendulum
+
+SCRIPT = CHECKOUT / "experiments" / "infer.py"
+TRUTH = ConstraintSet(Pendulum().space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])
+
+
+def infer(folder: Path, *overrides: str) -> subprocess.CompletedProcess[str]:
+    """Run the command as a user would, from another folder."""
+    return subprocess.run(
+        [sys.executable, str(SCRIPT), f"results={folder / 'results'}", *overrides],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def saved(folder: Path) -> Path:
+    """The one folder that a command wrote."""
+    (only,) = (folder / "results" / "inference").iterdir()
+    return only
+
+
+@pytest.fixture(scope="module")
+def shown() -> list[Demonstration]:
+    """Demonstrations of the pendulum under a truth, from the project's own demonstrator."""
+    system = Pendulum()
+    grid = Grid(system.space, (61, 61))
+    omega = solve(system, grid, TRUTH)
+    margin = border_margin(system, omega, 0.02)
+    box = Box(np.array([0.0, -2.0]), np.array([2 * np.pi, 2.0]))
+    trials = sample_trials(
+        system, omega, box, trials=24, seed=3, horizon=5.0, dt=0.02, margin=margin, restarts=1
+    )
+    attempts = demonstrate(
+        system, trials, TRUTH, SafetyFilter(system, omega, 0.02, margin), dt=0.02
+    )
+    return [attempt.demonstration for attempt in attempts if attempt.outcome is Outcome.KEPT]
+
+
+@pytest.fixture
+def recorded(tmp_path: Path, shown: list[Demonstration]) -> Path:
+    """A folder with the recorded files of all of them."""
+    (tmp_path / "recorded").mkdir()
+    for demonstration in shown:
+        path = tmp_path / "recorded" / f"{demonstration.name}.csv"
+        write_demonstration(path, demonstration, Pendulum().space)
+    return tmp_path
+
+
+def test_recorded_demonstrations_are_ranked_and_saved(
+    recorded: Path, shown: list[Demonstration]
+) -> None:
+    done = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.5", "top=3")
+    assert done.returncode == 0, done.stderr
+    folder = saved(recorded)
+    hypotheses = pd.read_csv(folder / "hypotheses.csv")
+    assert len(hypotheses) == 100
+    truth = hypotheses[
+        np.isclose(hypotheses["lower_angle"], np.pi)
+        & np.isclose(hypotheses["lower_angular_velocity"], 0.0)
+    ].iloc[0]
+    assert truth["feasible"]
+    assert truth["rank"] <= 5
+    candidates = ConstraintSet.from_grid(Pendulum().space, (10, 10))
+    violations = pd.read_csv(folder / "violations.csv").pivot(
+        index="demonstration", columns="hypothesis", values="violated"
+    )
+    for demonstration in shown:
+        expected = candidates.violated_by(demonstration.states)
+        np.testing.assert_array_equal(violations.loc[demonstration.name], expected)
+        numbers = " ".join(str(i) for i in np.flatnonzero(expected))
+        lines = [line for line in done.stdout.splitlines() if demonstration.name in line]
+        assert lines[0].replace("*", "").split(maxsplit=1)[1] == numbers
+    best = hypotheses.sort_values(["rank", "hypothesis"]).iloc[0]
+    assert f"{best['gain']:.3f}" in done.stdout
+    assert (folder / "map.png").stat().st_size > 10_000
+    record = json.loads((folder / "record.json").read_text())
+    assert record["config"]["dt"] == 0.5
+    assert record["not_used"] == []
+
+
+def test_a_bad_file_is_named_and_the_others_are_not_lost(recorded: Path) -> None:
+    bad = recorded / "recorded" / "bad.csv"
+    bad.write_text("time,angle,angular_velocity\n0,1,0\n0.01,nan,0\n0.02,1,0\n")
+    done = infer(recorded, "demonstrations=[recorded]", "grid=100", "dt=0.5")
+    assert done.returncode == 1
+    assert "bad.csv: line 3" in done.stderr
+    record = json.loads((saved(recorded) / "record.json").read_text())
+    assert len(record["not_used"]) == 1
+
+
+def test_durations_that_dt_does_not_divide(recorded: Path) -> None:
+    refused = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.3")
+    assert refused.returncode == 2
+    assert "does not cut its 5 s into whole steps" in refused.stderr
+    assert "round_horizon=true" in refused.stderr
+    assert not (recorded / "results").exists()
+    done = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.3", "round_horizon=true")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ([], "demonstrations: missing"),
+        (["demonstrations=nowhere"], "nowhere: there is no such file"),
+        (["demonstrations=nowhere", "dtt=1"], "dtt: unknown key; did you mean dt?"),
+        (["demonstrations=nowhere", "dt=0"], "dt: 0.0 must be above 0"),
+        (["demonstrations=nowhere", "start=[1]"], "start: [1.0] must have 2 entries"),
+        (["demonstrations=nowhere", "grid=7"], "grid: there is no 7"),
+    ],
+)
+def test_a_wrong_command_gets_one_clear_error(
+    tmp_path: Path, overrides: list[str], message: str
+) -> None:
+    done = infer(tmp_path, *overrides)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,181 @@
+"""The discretisation against one cell, one action, one region at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.integrate import solve_ivp
+
+from mlci.grids import Grid
+from mlci.maxent import log_partition, violation_probabilities
+from mlci.regions import ConstraintSet
+from mlci.spaces import Box
+from mlci.systems import DoubleIntegrator, Pendulum, System
+from mlci.tabular import TabularMDP, action_grid, discretize, forbid
+
+
+def reference_segment(system: System, start: np.ndarray, control: np.ndarray, dt: float):
+    """A dense, tightly integrated path (2001, n) of one move."""
+    solution = solve_ivp(
+        lambda _, x: system.dynamics(x, control),
+        (0, dt),
+        start,
+        t_eval=np.linspace(0, dt, 2001),
+        rtol=1e-10,
+        atol=1e-12,
+    )
+    return solution.y.T
+
+
+@pytest.mark.parametrize(
+    ("system", "shape", "dt"),
+    [(Pendulum(), (10, 10), 0.5), (Pendulum(), (14, 9), 1.0), (DoubleIntegrator(), (12, 8), 0.8)],
+)
+def test_moves_match_an_ode_solver(system: System, shape: tuple[int, int], dt: float) -> None:
+    grid, actions = Grid(system.space, shape), action_grid(system, 3)
+    regions = ConstraintSet.from_grid(system.space, (10, 10))
+    mdp = discretize(system, grid, actions, dt, regions)
+    crosses = mdp.crosses.toarray().reshape(grid.size, 3, -1)
+    checked = 0
+    for cell in range(0, grid.size, 3):
+        for a in range(3):
+            path = reference_segment(system, grid.centers[cell], actions[a], dt)
+            if not np.all(system.space.contains(path)):
+                edge = np.max(np.abs(path[:, 1])) - system.space.bounds.upper[1]
+                assert not mdp.allowed[cell, a] or edge < 1e-3
+                continue
+            inside = np.all(
+                (system.space.wrap(path)[:, None] > regions.lower)
+                & (system.space.wrap(path)[:, None] < regions.upper),
+                axis=2,
+            )
+            # A region that the path only grazes, for under 5 of 2001 samples, may go either way.
+            samples = inside.sum(axis=0)
+            sure = (samples == 0) | (samples > 5)
+            np.testing.assert_array_equal(crosses[cell, a, sure & (samples > 5)], True)
+            assert crosses[cell, a, samples == 0].sum() <= 1
+            assert mdp.successor[cell, a] == grid.index(path[-1]) or _near_edge(grid, path[-1])
+            assert mdp.reward[cell, a] == pytest.approx(-float(actions[a, 0] ** 2) * dt)
+            checked += 1
+    assert checked > 50
+
+
+def _near_edge(grid: Grid, state: np.ndarray) -> bool:
+    position = (grid.space.wrap(state) - grid.space.bounds.lower) / grid.widths
+    return bool(np.any(np.abs(position - np.round(position)) < 1e-4))
+
+
+def test_a_thin_constraint_between_a_cell_and_its_successor_is_caught() -> None:
+    """A tenth of a cell wide, strictly inside a move, for every move that jumps far enough."""
+    system = Pendulum()
+    grid, actions = Grid(system.space, (20, 20)), action_grid(system, 5)
+    cell = int(grid.index([1.0, 4.0]))
+    path = reference_segment(system, grid.centers[cell], actions[2], 0.5)
+    middle, width = path[1000], grid.widths / 10
+    thin = ConstraintSet.from_boxes(system.space, [Box(middle - width / 2, middle + width / 2)])
+    mdp = discretize(system, grid, actions, 0.5, thin)
+    assert grid.index(path[-1]) == mdp.successor[cell, 2]
+    assert int(grid.index(middle)) not in (cell, mdp.successor[cell, 2])
+    assert mdp.crosses.toarray().reshape(grid.size, 5)[cell, 2]
+    assert not forbid(mdp, 0).allowed[cell, 2]
+
+
+def test_a_path_that_leaves_the_bounds_and_returns_is_not_allowed() -> None:
+    """Thrown up against the limit of position, the mass would come back within the step."""
+    system = DoubleIntegrator(position_limit=1.0, speed_limit=2.0, control_limit=2.0)
+    grid = Grid(system.space, (10, 10))
+    mdp = discretize(system, grid, [[-2.0]], 1.0, ConstraintSet.from_grid(system.space, (2, 2)))
+    cell = int(grid.index([0.9, 1.0]))
+    end = reference_segment(system, grid.centers[cell], np.array([-2.0]), 1.0)[-1]
+    assert system.space.contains(end)
+    assert not mdp.allowed[cell, 0]
+
+
+def test_cell_averaged_model_is_the_mixture_over_start_points() -> None:
+    """Phi of the k = 2 model equals that of the MDP whose actions are (action, start) pairs."""
+    system = DoubleIntegrator()
+    grid, actions = Grid(system.space, (6, 6)), action_grid(system, 3)
+    regions = ConstraintSet.from_grid(system.space, (3, 3))
+    averaged = discretize(system, grid, actions, 1.0, regions, samples=2)
+    assert averaged.moves == 3 * 4
+    np.testing.assert_array_equal(averaged.action, np.repeat(np.arange(3), 4))
+    starts = grid.points_inside(2)
+    for move in (0, 5, 11):
+        end = starts[:, move % 4] @ np.array([[1.0, 0.0], [1.0, 1.0]])
+        end = end + np.array([0.5, 1.0]) * actions[move // 4]
+        expected = np.where(averaged.allowed[:, move], grid.index(end), -1)
+        np.testing.assert_array_equal(averaged.successor[:, move], expected)
+    log_z = log_partition(averaged, 14, [21], 4)
+    assert np.isfinite(log_z[0, 14])
+    assert np.all(violation_probabilities(averaged, log_z, 14) <= 1)
+
+
+def test_one_sample_is_the_centre_model() -> None:
+    system = Pendulum()
+    grid = Grid(system.space, (8, 8))
+    regions = ConstraintSet.from_grid(system.space, (4, 4))
+    actions = action_grid(system, 3)
+    centre = discretize(system, grid, actions, 0.5, regions)
+    # An odd subdivision has the centre as its middle point.
+    third = discretize(system, grid, actions, 0.5, regions, samples=3)
+    np.testing.assert_array_equal(centre.successor, third.successor[:, 4::9])
+
+
+def test_blocks_of_cells_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
+    system = Pendulum()
+    arguments = (
+        system,
+        Grid(system.space, (7, 9)),
+        action_grid(system, 3),
+        0.5,
+        ConstraintSet.from_grid(system.space, (5, 5)),
+    )
+    whole = discretize(*arguments, samples=2)
+    monkeypatch.setattr("mlci.tabular._MOVES_AT_ONCE", 50)
+    told: list[tuple[int, int]] = []
+    pieces = discretize(*arguments, samples=2, progress=lambda *count: told.append(count))
+    np.testing.assert_array_equal(whole.successor, pieces.successor)
+    np.testing.assert_array_equal(whole.reward, pieces.reward)
+    assert (whole.crosses != pieces.crosses).nnz == 0
+    assert told == sorted(told)
+    assert told[-1] == (63, 63)
+    assert len(told) > 10
+
+
+def test_temperature_divides_the_reward() -> None:
+    system = Pendulum()
+    arguments = (
+        system,
+        Grid(system.space, (4, 4)),
+        action_grid(system, 3),
+        0.5,
+        ConstraintSet.from_grid(system.space, (2, 2)),
+    )
+    cold = discretize(*arguments, temperature=0.5)
+    np.testing.assert_allclose(cold.reward, 2 * discretize(*arguments).reward)
+
+
+def test_action_grid_spans_the_control_box() -> None:
+    np.testing.assert_allclose(action_grid(Pendulum(), 5)[:, 0], [-2, -1, 0, 1, 2])
+    np.testing.assert_allclose(action_grid(Pendulum(), [1]), [[0.0]])
+    with pytest.raises(ValueError, match="counts of at least 1, not"):
+        action_grid(Pendulum(), 0)
+    with pytest.raises(ValueError, match="counts of at least 1, not"):
+        action_grid(Pendulum(), [3, 3])
+
+
+def test_errors_print_the_shapes() -> None:
+    ones = np.ones((3, 2), dtype=bool)
+    good = {
+        "successor": np.zeros((3, 2), dtype=np.int64),
+        "reward": np.zeros((3, 2)),
+        "allowed": ones,
+        "crosses": sparse.csr_matrix((6, 1), dtype=bool),
+        "action": np.arange(2),
+    }
+    TabularMDP(**good)
+    with pytest.raises(ValueError, match=r"reward \(2, 2\)"):
+        TabularMDP(**{**good, "reward": np.zeros((2, 2))})
+    with pytest.raises(ValueError, match="leads to no cell is marked as allowed"):
+        TabularMDP(**{**good, "successor": np.full((3, 2), -1)})

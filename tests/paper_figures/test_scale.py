@@ -1,0 +1,63 @@
+"""The scale figure, against its table, and the table, against what the benchmark measures."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from figure_study import scale_rows
+
+from experiments.config.paths import CHECKOUT
+from paper_figures import scale
+
+ROOT = CHECKOUT
+
+
+def test_the_figure_shows_the_table() -> None:
+    left, right = scale.draw(scale_rows()).axes
+    table = scale_rows()
+    for axes, columns in ((left, ["discretise_s", "infer_s"]), (right, ["peak_mb"])):
+        lines = [line for line in axes.lines if line.get_marker() != "None"]
+        drawn = [line.get_xydata() for line in lines]
+        expected = [
+            table.loc[table["system"] == system, ["states", column]].to_numpy(dtype=float)
+            for system in ("telescope", "torus")
+            for column in columns
+        ]
+        assert len(drawn) == len(expected)
+        for curve, values in zip(drawn, expected, strict=True):
+            np.testing.assert_allclose(curve, values)
+        assert axes.get_xscale() == axes.get_yscale() == "log"
+        assert [line.get_markerfacecolor() == "white" for line in lines] == [False] * len(
+            columns
+        ) + [True] * len(columns)
+        (guide,) = (line for line in axes.lines if line.get_linestyle() == ":")
+        x, y = np.log(np.array(guide.get_xydata())).T
+        np.testing.assert_allclose(np.diff(y), np.diff(x))
+        assert guide.get_xydata()[-1].tolist() == [4000.0, table[columns[0]].iloc[2]]
+
+
+def test_the_facts_are_the_tables() -> None:
+    lines = scale.facts(scale_rows()).splitlines()
+    expected = "  telescope, 2000 states: 0.2 s and 0.02 s, 110 MB, at most 20 % of the cells"
+    assert lines[4].startswith(expected)
+    slope = np.log(0.44 / 0.11) / np.log(4)
+    assert f"the time grows with the power {slope:.2f}" in "\n".join(lines)
+    assert sum("grows with the power" in line for line in lines) == 1
+
+
+def test_the_benchmark_measures_what_the_figure_needs() -> None:
+    command = [sys.executable, "-m", "tests.benchmark.scale", "torus", "5", "4", "5", "4"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    row = json.loads(done.stdout)
+    assert set(scale.TABLES["scale"]) <= set(row)
+    assert (row["states"], row["actions"], row["hypotheses"], row["steps"]) == (400, 15, 100, 20)
+    assert 0 < row["largest_active_share"] <= 1
+    parts = row["discretise_s"] + row["infer_s"]
+    assert row["total_s"] == pytest.approx(parts, abs=1e-3)
+    assert 0 < row["discretise_floor_s"] < row["discretise_s"] < 10
+    assert 30 < row["peak_mb"] < 1000

@@ -1,0 +1,42 @@
+"""A real point that takes a tenth of a second, and configs as commands compose them."""
+
+import dataclasses
+from typing import Any
+
+from hydra import compose, initialize_config_dir
+
+from experiments.app import version_base
+from experiments.config.command_line import quote_options
+from experiments.config.paths import CONF
+from experiments.config.read import plain_tree
+from experiments.config.settings import Settings
+from experiments.sweep.plugins import register_plugins
+
+TINY = (
+    "truth=wall",
+    "horizon=2.0",
+    "dt=0.5",
+    "actions=3",
+    "grid.shape=[12,8]",
+    "safety.shape=[41,21]",
+    "demonstrations.pairs=6",
+    "demonstrations.keep=3",
+    "demonstrations.restarts=1",
+    "demonstrations.dt=0.05",
+    "ranks.demonstrations=2",
+    "ranks.subsets=3",
+    "rollouts=1",
+)
+
+
+def composed(*overrides: str, name: str = "config") -> dict[str, Any]:
+    """A config as a command composes it, resolved."""
+    register_plugins()
+    with initialize_config_dir(str(CONF), **version_base()):
+        return plain_tree(compose(name, [quote_options(word) for word in overrides]))
+
+
+def hopeless(settings: Settings) -> Settings:
+    """The same point with a goal that no demonstration meets: it raises when it runs."""
+    strict = dataclasses.replace(settings.demonstrations, goal_tolerance=1e-12)
+    return dataclasses.replace(settings, demonstrations=strict)
