@@ -32,8 +32,8 @@ smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
 	$(BIN)/python -m paper_figures --results results/smoke $(STUDIES)
 	$(BIN)/python -m paper_figures.report --results results/smoke
 
-test: $(READY) ## run the tests
-	$(BIN)/python -m pytest
+test: $(READY) ## run the tests, on all cores
+	$(BIN)/python -m pytest -n logical --dist worksteal
 
 stress: $(READY) ## run what is too long for the tests: kill storms, fuzzing, SLURM, Dask, Hydra 1.4
 	@set -e; for each in $(wildcard tests/stress/*.py) $(wildcard tests/stress/*.sh); do \

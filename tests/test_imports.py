@@ -1,75 +1,212 @@
-"""Who may import whom: the README's walk is the order of the layers."""
+"""Which module may import which: tables to read, and the checks that hold the code to them."""
 
-import ast
+from __future__ import annotations
+
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).parents[1]
-SPACES = {"spaces"}
-SETS = SPACES | {"grids", "constraints"}
-MOTION = SPACES | {"systems", "simulate"}
-TABULAR = SETS | MOTION | {"ways", "mdp", "maxent"}
+PACKAGES = ("mlci", "experiments", "paper_figures")
 
-# A module of mlci to the modules of mlci that it may import.
-MAY_IMPORT = {
-    "__init__": set(),
-    "spaces": set(),
-    "grids": SPACES,
-    "constraints": SETS,
-    "systems": SPACES,
-    "soundness": SPACES | {"systems"},
-    "simulate": MOTION,
-    "reachability": SETS | MOTION,
-    "escapes": SETS | MOTION | {"reachability"},
-    "safety_filter": SETS | MOTION | {"reachability"},
-    "ilqr": MOTION,
-    "demonstrations": SPACES,
-    "demonstrator": SETS | MOTION | {"reachability", "ilqr", "demonstrations"},
-    "recording_formats": MOTION,
-    "recordings": MOTION | {"demonstrations", "recording_formats"},
-    "ways": SPACES,
-    "mdp": SETS | MOTION | {"ways"},
-    "maxent": TABULAR,
-    "inference": TABULAR,
-    "online": TABULAR | {"inference"},
-    "metrics": TABULAR | {"inference"},
+# A module of mlci, and what stands directly below it. It may import that, and all that is below
+# that. A package's name stands for its modules, which may import each other.
+MLCI = {
+    "mlci.spaces": "",
+    "mlci.grids": "mlci.spaces",
+    "mlci.regions": "mlci.grids",
+    "mlci.systems": "mlci.spaces",
+    "mlci.system_check": "mlci.systems",
+    "mlci.simulate": "mlci.systems",
+    "mlci.reachability": "mlci.regions mlci.systems",
+    "mlci.constant_controls": "mlci.reachability mlci.simulate",
+    "mlci.safety_filter": "mlci.reachability",
+    "mlci.ilqr": "mlci.simulate",
+    "mlci.demonstrations": "mlci.spaces",
+    "mlci.demonstrator": "mlci.demonstrations mlci.ilqr mlci.safety_filter mlci.simulate",
+    "mlci.recordings": "mlci.demonstrations mlci.systems",
+    "mlci.merged_moves": "mlci.spaces",
+    "mlci.tabular": "mlci.merged_moves mlci.regions mlci.simulate",
+    "mlci.maxent": "mlci.tabular",
+    "mlci.inference": "mlci.maxent",
+    "mlci.online": "mlci.inference",
+    "mlci.metrics": "mlci.inference",
 }
-MATHEMATICS = {"numpy", "scipy", "pyarrow", "mlci"}
+# What mlci may import of others: no configs, no files' formats but Parquet, no figures.
+MATHEMATICS = "numpy scipy pyarrow joblib"
+
+# A room of the framework, and all that it may import of this project.
+TRACKING, POINT = "experiments.tracking", "mlci experiments.config experiments.tracking"
+EVERYTHING = " ".join(PACKAGES)
+ROOMS = {
+    TRACKING: "",
+    "experiments.config.paths": "",
+    "experiments.config": f"mlci {TRACKING}",
+    "experiments.console": "mlci",
+    "experiments.point": f"{POINT} experiments.console",
+    "experiments.collate": TRACKING,
+    "experiments.sweep": f"{POINT} experiments.console experiments.point experiments.collate",
+    "experiments.lookback": f"{TRACKING} experiments.collate experiments.config.paths "
+    "experiments.console",
+    "paper_figures": f"mlci.regions {TRACKING} experiments.config.paths",
+    # The door: the commands, and what they share.
+    "experiments.app": EVERYTHING,
+    "experiments.run": EVERYTHING,
+    "experiments.infer": EVERYTHING,
+    "experiments.advise": EVERYTHING,
+    "experiments.results": EVERYTHING,
+}
+
+# Imports that are still there and have to go: nothing may be added.
+NOT_YET = """
+experiments.collate.examples imports experiments.point.tables
+experiments.collate.examples imports mlci.grids
+experiments.collate.examples imports mlci.regions
+experiments.collate.examples imports mlci.spaces
+experiments.collate.intervals imports mlci.spaces
+experiments.collate.join imports experiments.point.tables
+experiments.collate.reliability imports experiments.config.settings
+experiments.collate.reliability imports experiments.point.beliefs
+experiments.collate.reliability imports mlci.spaces
+experiments.config.paths imports experiments.config.settings
+experiments.lookback.archive imports experiments.config.schema
+experiments.lookback.freshness imports paper_figures.figure_notes
+experiments.tracking.environment imports experiments.config.paths
+experiments.tracking.points imports experiments.config.settings
+experiments.tracking.points imports experiments.point.run
+"""
+
+LONGEST = 300  # lines of a module
+LONGER = {
+    # module: why it is in one piece
+    "experiments/config/checks.py": "not yet in parts",
+    "experiments/config/settings.py": "not yet in parts",
+    "mlci/ilqr.py": "not yet in parts",
+}
+NAMES_THAT_SAY_NOTHING = {"common", "helpers", "misc", "util", "utils"}
+
+Graph = Mapping[str, set[str]]
 
 
-def imports(source: str) -> Iterator[str]:
-    """Dotted names that a module's source imports, at any depth; `from a import b` gives a.b."""
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "imports are absolute"
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+def import_graph(*packages: str) -> dict[str, set[str]]:
+    """Every module of some packages, with all modules that it imports, at any depth of its code."""
+    graph = grimp.build_graph(*packages, include_external_packages=True, cache_dir=None)
+    own = [name for name in graph.modules if name.split(".")[0] in packages]
+    return {name: set(graph.find_modules_directly_imported_by(name)) for name in sorted(own)}
 
 
-def modules(package: str) -> list[Path]:
-    return sorted((ROOT / package).rglob("*.py"))
+def is_of(module: str, entries: Iterable[str]) -> bool:
+    """Whether a module is one of the entries, or inside one of them."""
+    return any(module == entry or module.startswith(f"{entry}.") for entry in entries)
 
 
-def test_every_kind_of_import_is_seen():
-    source = "import a.b, c\nfrom d.e import f as g\ndef h():\n    from i import j, k\n"
-    assert list(imports(source)) == ["a.b", "c", "d.e.f", "i.j", "i.k"]
+def entry_of(module: str, table: Mapping[str, str]) -> str | None:
+    """The entry of a table that a module belongs to: the most special one."""
+    return max((entry for entry in table if is_of(module, [entry])), key=len, default=None)
 
 
-@pytest.mark.parametrize("path", modules("mlci"), ids=lambda path: path.stem)
-def test_mlci_knows_only_mathematics_and_the_layers_below(path):
-    names = [name.split(".") for name in imports(path.read_text())]
-    outside = {name[0] for name in names} - MATHEMATICS - sys.stdlib_module_names
-    assert not outside
-    assert path.stem in MAY_IMPORT, "a new module needs its place among the layers"
-    inside = {name[1] for name in names if name[0] == "mlci" and len(name) > 1}
-    assert inside <= MAY_IMPORT[path.stem]
+def with_all_below(table: Mapping[str, str]) -> dict[str, str]:
+    """The same table with everything that is below, not only what stands directly below."""
+    below: dict[str, set[str]] = {}
+    for entry in TopologicalSorter(
+        {name: line.split() for name, line in table.items()}
+    ).static_order():
+        directly = table[entry].split()
+        below[entry] = set(directly).union(*(below[name] for name in directly))
+    return {entry: " ".join(sorted(names)) for entry, names in below.items()}
 
 
-def test_figures_and_report_read_results_and_run_nothing():
-    for path in modules("paper_figures") + modules("paper_report"):
-        roots = {name.split(".")[0] for name in imports(path.read_text())}
-        assert not roots & {"experiments", "mlci", "hydra", "omegaconf"}, path
+def violations(graph: Graph, table: Mapping[str, str]) -> list[str]:
+    """The imports between modules of the graph that a table does not allow, a line each."""
+    lines = []
+    for module, imports in graph.items():
+        entry = entry_of(module, table)
+        for imported in sorted(imports & graph.keys()):
+            if entry is not None and not is_of(imported, [entry, *table[entry].split()]):
+                lines.append(f"{module} imports {imported}")
+    return lines
+
+
+def circle(graph: Graph) -> list[str]:
+    """Modules of which each imports the one before and the first the last, or nothing."""
+    try:
+        TopologicalSorter({name: graph[name] & graph.keys() for name in graph}).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+@pytest.fixture(scope="module")
+def graph() -> dict[str, set[str]]:
+    return import_graph(*PACKAGES)
+
+
+def test_a_violation_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a house of two floors with a cellar, whose modules import each other in every manner."""
+    sources = {
+        "house/__init__.py": "",
+        "house/cellar.py": "import json",
+        "house/ground/__init__.py": "from house import cellar",
+        "house/ground/hall.py": "def up():\n    from house.attic import box",
+        "house/ground/kitchen.py": "import house.ground.hall",
+        "house/attic.py": "from house.ground.kitchen import sink\nimport house.cellar",
+    }
+    for name, source in sources.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    graph = import_graph("house")
+    assert graph["house.cellar"] == {"json"}
+    stairs = {"house.cellar": "", "house.ground": "house.cellar", "house.attic": "house.ground"}
+    upward = "house.ground.hall imports house.attic"
+    assert violations(graph, with_all_below(stairs)) == [upward]
+    assert violations(graph, stairs) == ["house.attic imports house.cellar", upward]
+    # A module with an entry of its own is judged by that, not by its package's.
+    assert violations(graph, {**stairs, "house.ground.kitchen": ""}) == [
+        *("house.attic imports house.cellar", upward),
+        "house.ground.kitchen imports house.ground.hall",
+    ]
+    assert set(circle(graph)) == {"house.attic", "house.ground.hall", "house.ground.kitchen"}
+    assert not circle({**graph, "house.ground.hall": set()})
+
+
+def test_every_module_has_its_place(graph: Graph) -> None:
+    """A new module of mlci, and a new room, gets a line in a table above."""
+    packages = {"mlci", "experiments"}  # their __init__ may import anything below or nothing
+    placed = [module for module in graph if entry_of(module, {**MLCI, **ROOMS})]
+    assert graph.keys() - placed == packages
+
+
+def test_modules_of_mlci_import_those_below(graph: Graph) -> None:
+    assert violations(graph, with_all_below(MLCI)) == []
+
+
+def test_mlci_is_mathematics_alone(graph: Graph) -> None:
+    allowed = {"mlci", *MATHEMATICS.split(), *sys.stdlib_module_names}
+    for module, imports in graph.items():
+        if is_of(module, ["mlci"]):
+            assert {name.split(".")[0] for name in imports} <= allowed, module
+
+
+def test_rooms_import_those_below(graph: Graph) -> None:
+    assert set(violations(graph, ROOMS)) <= set(NOT_YET.splitlines())
+
+
+def test_nothing_imports_in_a_circle(graph: Graph) -> None:
+    assert circle(graph) == []
+
+
+def test_modules_are_short_and_named_for_what_is_inside(graph: Graph) -> None:
+    paths = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")]
+    assert len(paths) == len(graph)
+    long = {
+        path.relative_to(ROOT).as_posix()
+        for path in paths
+        if len(path.read_text().splitlines()) > LONGEST
+    }
+    assert long <= LONGER.keys()
+    assert not [path for path in paths if path.stem in NAMES_THAT_SAY_NOTHING]
