@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from commands import run_here
 
+from experiments import infer as command
 from experiments.config.paths import CHECKOUT
 from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
@@ -27,14 +29,8 @@ TRUTH = ConstraintSet(Pendulum().space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])
 
 
 def infer(folder: Path, *overrides: str) -> subprocess.CompletedProcess[str]:
-    """Run the command as a user would, from another folder."""
-    return subprocess.run(
-        [sys.executable, str(SCRIPT), f"results={folder / 'results'}", *overrides],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    """The command's end and words, in a folder."""
+    return run_here(command.main, f"results={folder / 'results'}", *overrides, folder=folder)
 
 
 def saved(folder: Path) -> Path:
@@ -73,7 +69,12 @@ def recorded(tmp_path: Path, shown: list[Demonstration]) -> Path:
 def test_recorded_demonstrations_are_ranked_and_saved(
     recorded: Path, shown: list[Demonstration]
 ) -> None:
-    done = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.5", "top=3")
+    """By the script, as a user would start it from another folder."""
+    words = ["demonstrations=recorded", "grid=100", "dt=0.5", "top=3"]
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), *words],
+        cwd=recorded, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     folder = saved(recorded)
     hypotheses = pd.read_csv(folder / "hypotheses.csv")
