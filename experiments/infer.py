@@ -23,7 +23,7 @@ from experiments.config.read import ConfigError, read_recorded_config
 from experiments.config.settings import RecordedSettings
 from experiments.console import diagnosis_lines, ranking_lines
 from experiments.point.tables import dimension_table, ranking_table
-from experiments.tracking.environment import surroundings
+from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.trees import canonical_json, plain
 from mlci.demonstrations import Demonstration
@@ -183,7 +183,7 @@ def _save(
         **made_from,
         "demonstrations": settings.demonstrations,
         "not_used": [str(problem) for problem in problems],
-        **surroundings(results_folder(settings)),
+        **environment(results_folder(settings)),
     }
     replace_file(folder / "record.json", json.dumps(record, indent=1).encode() + b"\n")
     return folder

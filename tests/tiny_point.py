@@ -1,6 +1,7 @@
 """A real point that takes a tenth of a second, and configs as commands compose them."""
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 from hydra import compose, initialize_config_dir
@@ -10,7 +11,10 @@ from experiments.config.command_line import quote_options
 from experiments.config.paths import CONF
 from experiments.config.read import plain_tree
 from experiments.config.settings import Settings
+from experiments.sweep import attempts
 from experiments.sweep.plugins import register_plugins
+from experiments.tracking.points import Point
+from experiments.tracking.trees import plain
 
 TINY = (
     "truth=wall",
@@ -34,6 +38,18 @@ def composed(*overrides: str, name: str = "config") -> dict[str, Any]:
     register_plugins()
     with initialize_config_dir(str(CONF), **version_base()):
         return plain_tree(compose(name, [quote_options(word) for word in overrides]))
+
+
+def planned(settings: Settings, results: Path) -> Point:
+    """The point of some settings."""
+    return Point.planned(plain(settings), results)
+
+
+def computed(settings: Settings, results: Path, *, force: bool = False) -> Point:
+    """The point of some settings, run here."""
+    point = planned(settings, results)
+    attempts.run(point, settings, print, force=force)
+    return point
 
 
 def hopeless(settings: Settings) -> Settings:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from experiments.collate.settings_of import settings_of
 from experiments.point.tables import FIRST, box_table
 from mlci.grids import Grid
 from mlci.regions import ConstraintSet
@@ -76,9 +77,9 @@ def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
             tables["compared_violations"].append(_violations(point, trial))
         path = _of_trial(_read(example, "paths"), trial, "demonstration")
         tables["compared_paths"].append(path.round(_DECIMALS))
-        for crossing in sorted({point.settings.tasks.crossing for point in of_truth}):
-            alike = [point for point in of_truth if point.settings.tasks.crossing == crossing]
-            usual = min(alike, key=lambda point: (unusual[point.identity], point.settings.seed))
+        for crossing in sorted({settings_of(point).tasks.crossing for point in of_truth}):
+            alike = [point for point in of_truth if settings_of(point).tasks.crossing == crossing]
+            usual = min(alike, key=lambda point: (unusual[point.identity], settings_of(point).seed))
             for name, table in _first(usual).items():
                 table.insert(0, "tasks.crossing", crossing)
                 tables[f"first_{name}"].append(table)
@@ -87,12 +88,12 @@ def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
 
 def _truth(point: Point) -> str:
     """The name of a point's truth in tables."""
-    return str(point.settings.columns["truth"])
+    return str(settings_of(point).columns["truth"])
 
 
 def _distance(point: Point) -> tuple[float, ...]:
     """How far a point is from the example; the first difference decides."""
-    settings = point.settings
+    settings = settings_of(point)
     return (
         abs(math.prod(settings.grid.shape) - CELLS),
         abs(settings.dt - DT),
@@ -105,8 +106,8 @@ def _distance(point: Point) -> tuple[float, ...]:
 def _unusual(points: Sequence[Point]) -> dict[str, int]:
     """How many settings of each point are not those of most points, by its identity."""
     counts: dict[str, int] = dict.fromkeys((point.identity for point in points), 0)
-    for field in fields(points[0].settings):
-        values = {point.identity: repr(getattr(point.settings, field.name)) for point in points}
+    for field in fields(settings_of(points[0])):
+        values = {point.identity: repr(getattr(settings_of(point), field.name)) for point in points}
         times = Counter(values.values())
         usual = min(times, key=lambda value: (-times[value], value))
         for identity, value in values.items():
@@ -152,11 +153,11 @@ def _comparison(example: Point, points: Sequence[Point]) -> tuple[int, list[Poin
     example's at which nearly all demonstrations are feasible in all of these grids, or, where
     there is none, the most. The trial is the one of them that passes nearest to the truth.
     """
-    own = example.settings
+    own = settings_of(example)
     by_dt: dict[float, list[Point]] = {}
     for point in points:
-        if replace(point.settings, grid=own.grid, dt=own.dt) == own:
-            by_dt.setdefault(point.settings.dt, []).append(point)
+        if replace(settings_of(point), grid=own.grid, dt=own.dt) == own:
+            by_dt.setdefault(settings_of(point).dt, []).append(point)
     enough = _ENOUGH * len(_read(example, "trials"))
     trials, alike = np.empty(0, dtype=np.int64), [example]
     for dt in sorted(by_dt, key=lambda dt: (abs(dt - own.dt), dt)):
@@ -169,14 +170,14 @@ def _comparison(example: Point, points: Sequence[Point]) -> tuple[int, list[Poin
             break
     paths = _read(example, "paths")
     paths = paths[paths["demonstration"].isin(trials)]
-    names = list(example.settings.model.space.names)
-    distance = example.settings.constraint.signed_distance(paths[names].to_numpy())
+    names = list(settings_of(example).model.space.names)
+    distance = settings_of(example).constraint.signed_distance(paths[names].to_numpy())
     return (int(paths["demonstration"].iloc[np.argmin(distance)]) if len(paths) else -1), alike
 
 
 def _count(point: Point) -> int:
     """Cells of a point's grid."""
-    return math.prod(point.settings.grid.shape)
+    return math.prod(settings_of(point).grid.shape)
 
 
 def _feasible_in_all(points: Sequence[Point]) -> Ints:
@@ -191,12 +192,12 @@ def _feasible_in_all(points: Sequence[Point]) -> Ints:
 def _cells(point: Point, trial: int) -> pd.DataFrame:
     """The cells that a trial's sampled trajectory visits, with their corners."""
     visits = _named(point, _of_trial(_read(point, "sampled"), trial).copy())
-    return _with_boxes(visits, "cell", _grid_boxes(point.settings.cells))
+    return _with_boxes(visits, "cell", _grid_boxes(settings_of(point).cells))
 
 
 def _moves(point: Point) -> pd.DataFrame:
     """The moves of the cells that the first trajectory visits, with both cells' corners."""
-    boxes = _grid_boxes(point.settings.cells)
+    boxes = _grid_boxes(settings_of(point).cells)
     moves = _with_boxes(_read(point, "moves"), "cell", boxes)
     return _with_boxes(moves, "successor", boxes.add_prefix("successor_"))
 
@@ -210,7 +211,7 @@ def _violations(point: Point, trial: int) -> pd.DataFrame:
 
 def _hypothesis_boxes(point: Point) -> pd.DataFrame:
     """The corners of every hypothesis."""
-    return box_table("hypothesis", point.settings.candidates).drop(columns="hypothesis")
+    return box_table("hypothesis", settings_of(point).candidates).drop(columns="hypothesis")
 
 
 def _grid_boxes(grid: Grid) -> pd.DataFrame:

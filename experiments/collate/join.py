@@ -21,10 +21,11 @@ from experiments.collate.cases import case_table
 from experiments.collate.examples import example_tables
 from experiments.collate.intervals import study_tables
 from experiments.collate.reliability import reliability
+from experiments.collate.settings_of import settings_of
 from experiments.point.tables import TRUTH_TABLES, opening_columns
 from experiments.tracking.files import csv_bytes, digest, replacing
 from experiments.tracking.study import collated, whole_study, write_collated
-from experiments.tracking.trees import flatten, plain
+from experiments.tracking.trees import flatten
 
 if TYPE_CHECKING:
     from experiments.tracking.points import Point
@@ -57,11 +58,11 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
         by_source.setdefault(record["source"], []).append(identity)
     if len(by_source) > 1 and not mixed:
         raise CollateError(_describe_mixture(by_source))
-    flat = {point.identity: flatten(plain(point.settings)) for point in points}
+    flat = {point.identity: flatten(dict(point.config)) for point in points}
     ordered = sorted(
         points,
         key=lambda point: (
-            _sort_key(point.settings.columns),
+            _sort_key(settings_of(point).columns),
             _sort_key(flat[point.identity]),
             point.identity,
         ),
@@ -188,7 +189,7 @@ def _extra_columns(
 
     keys = dict.fromkeys(key for group in groups for key in flat[group[0].identity])
     known: list[tuple[Any, ...]] = [
-        tuple(opening_columns(measure, group[0].settings).values()) for group in groups
+        tuple(opening_columns(measure, settings_of(group[0])).values()) for group in groups
     ]
     extra = []
     several = [group for group in groups if len(group) > 1]

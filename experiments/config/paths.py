@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from experiments.config.settings import RecordedSettings, StudySettings
+from experiments.tracking import environment
 
 _CODE = Path(__file__).resolve().parents[1]
 
-CHECKOUT = _CODE.parent if (_CODE.parent / "conf" / "config.yaml").is_file() else None
+CHECKOUT = environment.CHECKOUT
 CONF = _CODE / "conf" if CHECKOUT is None else CHECKOUT / "conf"
 
 

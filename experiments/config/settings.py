@@ -330,6 +330,7 @@ class StudySettings:
     case: str | None
     results: str | None
     workers: int | None
+    examples: Mapping[str, Any]
     sweep: SweepSettings
 
 

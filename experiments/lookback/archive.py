@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from experiments.config.schema import did_you_mean
-from experiments.tracking.points import PointFolder, State, point_source
+from experiments.tracking.points import Point, State
 from experiments.tracking.study import Study, StudyError, read_study
 from experiments.tracking.trees import flatten
 
@@ -25,30 +25,28 @@ class ArchiveError(Exception):
 
 
 @dataclass(frozen=True)
-class KeptPoint(PointFolder):
-    """A point that is known by its identity alone."""
+class KeptPoint:
+    """What a person asks about a point, each looked up once.
 
-    results: Path
-    name: str
+    Attributes:
+        point: the point.
+    """
+
+    point: Point
 
     @property
     def identity(self) -> str:
-        return self.name
+        return self.point.identity
 
     @cached_property
     def content(self) -> dict[str, Any]:
         """Its record, or nothing unless it finished and is as it was written."""
-        return self.record() or {}
-
-    @cached_property
-    def source(self) -> str:
-        """Hash of the source of now that its result depends on."""
-        return point_source(str(self.config.get("system.target", "")))
+        return self.point.record() or {}
 
     @cached_property
     def known_state(self) -> State:
         """Its state when it was first asked for."""
-        return self.state()
+        return self.point.state()
 
     @cached_property
     def config(self) -> dict[str, Any]:
@@ -60,7 +58,7 @@ class KeptPoint(PointFolder):
         """The row of its summary table, opened by its columns; nothing unless it finished."""
         if "summary.csv" not in self.content.get("files", {}):
             return {}
-        with (self.folder / "summary.csv").open(newline="") as file:
+        with (self.point.folder / "summary.csv").open(newline="") as file:
             row = next(csv.DictReader(file), {})
         return {key: _value(text) for key, text in row.items()}
 
@@ -103,11 +101,13 @@ class Archive:
     def points(self) -> dict[str, KeptPoint]:
         """Every point with a folder, by its identity."""
         folders = sorted(self.results.glob("points/*/"))
-        return {folder.name: KeptPoint(self.results, folder.name) for folder in folders}
+        return {folder.name: KeptPoint(Point(self.results, folder.name)) for folder in folders}
 
     def points_of(self, study: Study) -> list[KeptPoint]:
         """The points of a study, in the order of its plan."""
-        return [self.points.get(name) or KeptPoint(self.results, name) for name in study.points]
+        return [
+            self.points.get(name) or KeptPoint(Point(self.results, name)) for name in study.points
+        ]
 
     def find(self, name: str) -> Study | KeptPoint:
         """A study by its name, or a point by its identity or the beginning of it.
@@ -124,7 +124,7 @@ class Archive:
         if re.fullmatch("[0-9a-f]+", name):
             matches = sorted(key for key in planned.union(self.points) if key.startswith(name))
             if len(matches) == 1:
-                return self.points.get(matches[0]) or KeptPoint(self.results, matches[0])
+                return self.points.get(matches[0]) or KeptPoint(Point(self.results, matches[0]))
             if matches:
                 some = ", ".join(match[: len(name) + 8] for match in matches[:5])
                 raise ArchiveError(f"{name}: {len(matches)} points begin so, such as {some}")

@@ -61,20 +61,20 @@ def leftovers(archive: Archive) -> tuple[list[Leftover], list[str]]:
     used = {identity for study in archive.studies.values() for identity in study.points}
     for study in archive.studies.values():
         used.update(study.collated.points if study.collated else ())
-    running = {name for name, point in archive.points.items() if point.is_running()}
+    running = {name for name, point in archive.points.items() if point.point.is_running()}
     found = [
         Leftover(
             f"point {name[:12]}, in no study",
             # Without its record, a point that is half removed does not count as done.
-            (point.folder / "record.json", point.folder),
-            point.folder / ".lock",
+            (point.point.folder / "record.json", point.point.folder),
+            point.point.folder / ".lock",
         )
         for name, point in archive.points.items()
         if name not in used | running
     ]
     notes = [f"point {name[:12]} is kept: it is running" for name in sorted(running - used)]
     records = {
-        name: archive.points[name].note("record") if name in archive.points else None
+        name: archive.points[name].point.note("record") if name in archive.points else None
         for name in used
     }
     if running or not all(records.values()):

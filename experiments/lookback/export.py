@@ -24,7 +24,7 @@ def tidy_table(points: Sequence[KeptPoint], measure: str) -> pd.DataFrame:
         if name not in record["files"]:
             known = ", ".join(Path(file).stem for file in record["files"] if file.endswith(".csv"))
             raise ArchiveError(f"{measure}: no such table; there are {known}")
-        rows = pd.read_csv(point.folder / name)
+        rows = pd.read_csv(point.point.folder / name)
         opening: dict[str, object] = {
             "point": point.identity,
             "state": str(point.known_state),

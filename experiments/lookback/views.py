@@ -8,7 +8,7 @@ from typing import Any
 from experiments.console import job_names, table_lines
 from experiments.lookback.archive import Archive, KeptPoint, count_states, varying
 from experiments.lookback.freshness import figure_concerns, table_concerns
-from experiments.tracking.points import State
+from experiments.tracking.points import Point, State
 from experiments.tracking.study import Study
 from experiments.tracking.trees import flatten
 
@@ -41,7 +41,7 @@ def point_list(
         for each in archive.studies.values():
             for name in each.points:
                 members.setdefault(name, []).append(each.name)
-        points = [archive.points.get(n) or KeptPoint(archive.results, n) for n in members]
+        points = [archive.points.get(n) or KeptPoint(Point(archive.results, n)) for n in members]
         names = [", ".join(members[point.identity]) or "(no study)" for point in points]
     else:
         points = archive.points_of(study)
@@ -102,17 +102,18 @@ def point_facts(point: KeptPoint) -> Iterator[str]:
     """State, config and record by dotted keys, then the log."""
     yield f"point    {point.identity}"
     yield f"state    {point.known_state}"
-    yield f"folder   {point.folder}"
+    yield f"folder   {point.point.folder}"
     if point.known_state is State.STALE:
-        yield f"         source was {point.content['source'][:_SHORT]}, is {point.source[:_SHORT]}"
-    if failure := point.failure():
+        was, now = point.content["source"][:_SHORT], point.point.source[:_SHORT]
+        yield f"         source was {was}, is {now}"
+    if failure := point.point.failure():
         facts = flatten({key: value for key, value in failure.items() if key != "traceback"})
         yield from ["", "failure", *_facts(facts), *f"{failure.get('traceback')}".splitlines()]
     if point.content:
         record = {key: v for key, v in point.content.items() if key not in ("config", "summary")}
         yield from ["", "config", *_facts(point.config), "", "record", *_facts(flatten(record))]
         yield from ["", "summary", *_facts(point.summary)]
-    log = point.folder / "log.txt"
+    log = point.point.folder / "log.txt"
     if log.exists():
         yield from ["", "log", *(f"  {line}" for line in log.read_text().splitlines())]
 

@@ -19,8 +19,9 @@ import pandas as pd
 from filelock import Timeout
 
 import experiments.point.run
+from experiments.config.settings import Settings
 from experiments.point.tables import table_bytes
-from experiments.tracking.environment import forget_peak_memory, peak_memory, surroundings
+from experiments.tracking.environment import environment, peak_memory, reset_peak_memory
 from experiments.tracking.files import PART, digest, replace_file
 from experiments.tracking.points import Point, State
 from experiments.tracking.store import Store
@@ -30,11 +31,14 @@ from experiments.tracking.trees import plain
 _LAST_WORDS = "last_words.txt"
 
 
-def run(point: Point, log: Callable[[str], None], *, force: bool = False) -> State:
+def run(
+    point: Point, settings: Settings, log: Callable[[str], None], *, force: bool = False
+) -> State:
     """Run a point here, unless it is done; whoever runs it already is waited for.
 
     Args:
         point: the point.
+        settings: what it is computed from.
         log: called with each line that the point prints.
         force: whether to run it even if it is done.
 
@@ -44,15 +48,18 @@ def run(point: Point, log: Callable[[str], None], *, force: bool = False) -> Sta
     point.folder.mkdir(parents=True, exist_ok=True)
     with point.lock:
         if force or not point.is_done():
-            _attempt(point, log)
+            _attempt(point, settings, log)
     return State.DONE
 
 
-def run_apart(point: Point, *, force: bool = False, time_limit: float | None = None) -> State:
+def run_apart(
+    point: Point, settings: Settings, *, force: bool = False, time_limit: float | None = None
+) -> State:
     """Run a point in a process that does nothing else meanwhile; its output goes to its log.
 
     Args:
         point: the point.
+        settings: what it is computed from.
         force: whether to run it even if it is done.
         time_limit: [s] after which this process is ended.
 
@@ -64,7 +71,7 @@ def run_apart(point: Point, *, force: bool = False, time_limit: float | None = N
         with point.lock.acquire(blocking=False):
             if force or not point.is_done():
                 with _last_words(point, time_limit):
-                    _attempt(point, None)
+                    _attempt(point, settings, None)
         return State.DONE
     except Timeout:
         return State.RUNNING
@@ -103,7 +110,7 @@ def _failed(point: Point, after: int) -> dict[str, Any] | None:
     return failure if failure and int(failure.get("attempt", 1)) > after else None
 
 
-def _attempt(point: Point, log: Callable[[str], None] | None) -> None:
+def _attempt(point: Point, settings: Settings, log: Callable[[str], None] | None) -> None:
     """Compute the point, and keep its tables and record, or its failure.
 
     All output of the process goes to the point's log, unless `log` is to be told each line.
@@ -124,10 +131,10 @@ def _attempt(point: Point, log: Callable[[str], None] | None) -> None:
         for left in point.folder.glob(f".*{PART}"):  # by an attempt that was killed
             left.unlink()
         _write(point, "attempt", note)
-        forget_peak_memory()
+        reset_peak_memory()
         store = Store(point.results / "store")
-        tables = _compute(point, store, log)
-        _keep_result(point, store, tables, note)
+        tables = _compute(point, settings, store, log)
+        _keep_result(point, settings, store, tables, note)
     except Exception as error:
         _keep_failure(point, "raised", describe(error), traceback.format_exc(), number)
         raise
@@ -135,7 +142,7 @@ def _attempt(point: Point, log: Callable[[str], None] | None) -> None:
 
 
 def _compute(
-    point: Point, store: Store, log: Callable[[str], None] | None
+    point: Point, settings: Settings, store: Store, log: Callable[[str], None] | None
 ) -> Mapping[str, pd.DataFrame]:
     """The point's tables; its lines, and its traceback, go to its log."""
     with (
@@ -150,27 +157,31 @@ def _compute(
                 log(line)
 
         try:
-            return experiments.point.run.run_point(point.settings, store, keep)
+            return experiments.point.run.run_point(settings, store, keep)
         except Exception:
             file.write(traceback.format_exc())
             raise
 
 
 def _keep_result(
-    point: Point, store: Store, tables: Mapping[str, pd.DataFrame], note: Mapping[str, Any]
+    point: Point,
+    settings: Settings,
+    store: Store,
+    tables: Mapping[str, pd.DataFrame],
+    note: Mapping[str, Any],
 ) -> None:
     """Write the tables, then the record."""
     files = {"log.txt": digest((point.folder / "log.txt").read_bytes())}
     for name, frame in sorted(tables.items()):
-        data = table_bytes(name, frame, point.settings)
+        data = table_bytes(name, frame, settings)
         files[f"{name}.csv"] = digest(data)
         replace_file(point.folder / f"{name}.csv", data)
     row = tables["summary"].to_dict("records")[0] if "summary" in tables else {}
     record = {
         "identity": point.identity,
         "source": point.source,
-        "config": plain(point.settings),
-        "seed": point.settings.seed,
+        "config": plain(settings),
+        "seed": settings.seed,
         "summary": {name: _finite(value) for name, value in row.items()},
         "files": files,
         "stages": store.keys,
@@ -178,7 +189,7 @@ def _keep_result(
         "started": note["started"],
         "seconds": {stage: round(spent, 3) for stage, spent in store.seconds.items()},
         "peak_memory_mb": peak_memory(),
-        **surroundings(point.results),
+        **environment(point.results),
     }
     _write(point, "record", record)
 

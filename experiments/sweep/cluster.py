@@ -26,6 +26,7 @@ from experiments.sweep.attempts import bury
 from experiments.sweep.pool import Job, PoolLauncher, end_when
 from experiments.sweep.worker import run_task
 from experiments.tracking.points import Point
+from experiments.tracking.trees import plain
 
 Share = Mapping[Job, dict[str, Any]]  # resolved configs by the overrides that made them
 
@@ -108,7 +109,7 @@ def run_share(share: Share, workers: int) -> None:
 def _point(tree: Mapping[str, Any]) -> Point:
     """The point of a resolved config."""
     settings, study = read_config(tree)
-    return Point(settings, results_folder(study))
+    return Point.planned(plain(settings), results_folder(study))
 
 
 def _main() -> None:

@@ -29,6 +29,7 @@ from experiments.sweep.pool import PoolLauncher
 from experiments.sweep.worker import run_task
 from experiments.tracking.points import Point, State
 from experiments.tracking.study import write_plan
+from experiments.tracking.trees import plain
 
 
 class SweepFailed(Exception):
@@ -80,7 +81,7 @@ class Planner(Sweeper):
                 mark = "run" if planned in selected else ""
                 print(f"{mark:4}{planned.state:8}{planned.point.identity[:8]}  {planned.name}")
             return
-        write_plan(folder, [(planned.point, planned.job) for planned in plan])
+        write_plan(folder, [(each.point, each.job) for each in plan], study.examples)
         outcome = run_points(
             todo, lambda jobs: self._launcher.launch(jobs, initial_job_idx=0), options
         )
@@ -166,7 +167,7 @@ class Planner(Sweeper):
                 for line in explain(error).splitlines():
                     problems.setdefault(line, []).append(name)
                 continue
-            point = Point(settings, results_folder(study))
+            point = Point.planned(plain(settings), results_folder(study))
             if point.identity not in plan:
                 plan[point.identity] = Planned(tuple(job), name, point, point.state())
                 trees[tuple(job)] = tree

@@ -8,6 +8,7 @@ from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, plain_tree, read_config
 from experiments.sweep import attempts as attempt
 from experiments.tracking.points import Point, State
+from experiments.tracking.trees import plain
 
 
 def run_once(config: DictConfig) -> None:
@@ -20,7 +21,7 @@ def run_once(config: DictConfig) -> None:
     for option in ("only", "limit", "time_limit", "retries", "fail_fast", "mix_sources"):
         if getattr(study.sweep, option):
             raise ConfigError(f"sweep.{option}: only a sweep heeds it; add -m, or leave it out")
-    point = Point(settings, results_folder(study))
+    point = Point.planned(plain(settings), results_folder(study))
     if study.sweep.dry_run:
         print(f"{point.state()}: {point.folder}")
     elif point.is_done() and not study.sweep.force:
@@ -29,7 +30,7 @@ def run_once(config: DictConfig) -> None:
     else:
         if point.is_running():
             print(f"another process runs this point, and is waited for: {point.folder}")
-        attempt.run(point, print, force=study.sweep.force)
+        attempt.run(point, settings, print, force=study.sweep.force)
         print(f"written: {point.folder}")
 
 
@@ -40,5 +41,7 @@ def run_task(config: DictConfig) -> State:
         State.DONE, or State.RUNNING if somebody else runs it.
     """
     settings, study = read_config(plain_tree(config))
-    point = Point(settings, results_folder(study))
-    return attempt.run_apart(point, force=study.sweep.force, time_limit=study.sweep.time_limit)
+    point = Point.planned(plain(settings), results_folder(study))
+    return attempt.run_apart(
+        point, settings, force=study.sweep.force, time_limit=study.sweep.time_limit
+    )

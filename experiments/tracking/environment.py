@@ -13,8 +13,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from experiments.config.paths import CHECKOUT
 from experiments.tracking.files import digest, replace_file
+
+_ROOT = Path(__file__).resolve().parents[2]
+# The folder of the project's source tree; None for an installed wheel.
+CHECKOUT = _ROOT if (_ROOT / "pyproject.toml").is_file() else None
 
 _PACKAGES = (
     "mlci",
@@ -26,16 +29,16 @@ _PACKAGES = (
     "filelock",
     "pebble",
 )
-# Untracked files above this size [bytes] are named in a record, and their content is not kept.
-_LARGEST_KEPT = 200_000
+# Untracked files above this size [bytes] are named in a record, but not part of its diff.
+_LARGEST_IN_DIFF = 200_000
 
 
-def surroundings(results: Path) -> dict[str, Any]:
-    """What a record says of the code and the machine.
+def environment(results: Path) -> dict[str, Any]:
+    """What a record says about the code, the packages and the machine.
 
     Args:
-        results: the folder of all results; what the checkout has changed since its commit is kept
-            in its `diffs`, once for all records.
+        results: the folder of all results; the checkout's changes since its commit are written to
+            its `diffs`, once for all records.
     """
     commit, diff, untracked = _git_state()
     name = None
@@ -56,8 +59,8 @@ def surroundings(results: Path) -> dict[str, Any]:
     }
 
 
-def forget_peak_memory() -> None:
-    """Start the peak of this process's memory anew, where the system allows it."""
+def reset_peak_memory() -> None:
+    """Measure this process's peak memory from now on, where the system allows it."""
     try:
         Path("/proc/self/clear_refs").write_text("5")
     except OSError:
@@ -65,7 +68,7 @@ def forget_peak_memory() -> None:
 
 
 def peak_memory() -> int:
-    """Peak of this process's memory [MB], since `forget_peak_memory` where that is possible."""
+    """Peak of this process's memory [MB], since `reset_peak_memory` where that is possible."""
     try:
         status = Path("/proc/self/status").read_text()
         return int(status.split("VmHWM:")[1].split()[0]) // 1024
@@ -76,20 +79,20 @@ def peak_memory() -> int:
 
 @cache
 def _git_state() -> tuple[str | None, bytes, list[str]]:
-    """Commit, all changes since as a diff, and untracked files; results count for neither.
+    """Commit, all changes since then as a diff, and untracked files; `results` is left out.
 
-    Looked up once, as this process's code does not change either.
+    Looked up once: this process's code does not change later.
     """
     head = _git("rev-parse", "HEAD")
     if head is None:
         return None, b"", []
-    but_results = ("--", ".", ":(exclude)results")
-    diff = _git("diff", "--binary", "HEAD", *but_results) or b""
-    listed = _git("ls-files", "-z", "--others", "--exclude-standard", *but_results) or b""
-    untracked = [os.fsdecode(name) for name in listed.split(b"\0") if name]
+    without_results = ("--", ".", ":(exclude)results")
+    diff = _git("diff", "--binary", "HEAD", *without_results) or b""
+    names = _git("ls-files", "-z", "--others", "--exclude-standard", *without_results) or b""
+    untracked = [os.fsdecode(name) for name in names.split(b"\0") if name]
     for name in untracked:
         path = Path(CHECKOUT or "", name)
-        if path.is_file() and path.stat().st_size <= _LARGEST_KEPT:
+        if path.is_file() and path.stat().st_size <= _LARGEST_IN_DIFF:
             diff += _git("diff", "--binary", "--no-index", "--", "/dev/null", name) or b""
     return head.decode().strip(), diff, untracked
 
@@ -122,10 +125,10 @@ def _processor() -> str:
 @cache
 def _versions() -> dict[str, str | None]:
     """Versions of the packages that the result may depend on."""
-    found: dict[str, str | None] = {}
+    versions: dict[str, str | None] = {}
     for package in _PACKAGES:
         try:
-            found[package] = version(package)
+            versions[package] = version(package)
         except PackageNotFoundError:
-            found[package] = None
-    return found
+            versions[package] = None
+    return versions

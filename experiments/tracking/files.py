@@ -8,13 +8,9 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import pandas as pd
-
-if TYPE_CHECKING:
-    pass
-
 
 PART = ".part"  # the end of the names of files that are being written
 
@@ -32,9 +28,9 @@ def replace_file(path: Path, data: bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A file to write, which takes the place of the old one once all of it is on disk.
+    """A file to write; it takes the place of the old one when the block ends, all of it on disk.
 
-    Its attribute `name` is the path that it has until then.
+    Its attribute `name` is its path until then.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=PART)

@@ -1,4 +1,4 @@
-"""A point on disk, and what its files tell of it.
+"""A point on disk, and what its files say about it.
 
 `<results>/points/<identity>/` holds the point's tables, its `log.txt` and, written last, the
 `record.json` that makes it count; or the `failure.json` of its last attempt. While an attempt runs,
@@ -9,8 +9,8 @@ who it is.
 from __future__ import annotations
 
 import json
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
@@ -18,11 +18,12 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from experiments.config.settings import Settings
-from experiments.point import run as point
 from experiments.tracking.files import digest
 from experiments.tracking.sources import source_hash
 from experiments.tracking.trees import canonical_json
+
+# The module that computes a point: named, so that its source counts, and not imported.
+POINT_CODE = "experiments.point.run"
 
 
 class State(StrEnum):
@@ -35,24 +36,41 @@ class State(StrEnum):
     MISSING = "missing"
 
 
-class PointFolder(ABC):
-    """What is kept of a point.
+@dataclass(frozen=True)
+class Point:
+    """A point and where it is on disk.
 
     Attributes:
         results: the folder of all results.
+        identity: the point's name, a hash of its config.
     """
 
     results: Path
+    identity: str
+    _planned: Mapping[str, Any] | None = field(default=None, repr=False, compare=False)
 
-    @property
-    @abstractmethod
-    def identity(self) -> str:
-        """The point's name."""
+    @classmethod
+    def planned(cls, config: Mapping[str, Any], results: Path) -> Point:
+        """The point of a config: one, whatever study or spelling the config comes from.
 
-    @property
-    @abstractmethod
+        Args:
+            config: all that decides the point's result, as plain nested values.
+            results: the folder of all results.
+        """
+        return cls(results, digest(canonical_json(config))[:32], config)
+
+    @cached_property
+    def config(self) -> Mapping[str, Any]:
+        """Its config as planned, or as its record has it; empty if neither is known."""
+        if self._planned is not None:
+            return self._planned
+        config: Mapping[str, Any] = (self.record() or {}).get("config", {})
+        return config
+
+    @cached_property
     def source(self) -> str:
         """Hash of all the project's source that the result depends on, as it is now."""
+        return point_source(str(self.config.get("system", {}).get("target", "")))
 
     @property
     def folder(self) -> Path:
@@ -60,7 +78,7 @@ class PointFolder(ABC):
 
     @property
     def lock(self) -> FileLock:
-        """Held by whoever runs the point; a new object each time, as each is a holder."""
+        """Held by the process that runs the point; a new object each time, as each is a holder."""
         return FileLock(self.folder / ".lock")
 
     def state(self) -> State:
@@ -79,10 +97,12 @@ class PointFolder(ABC):
         record = self.note("record")
         try:
             files = record["files"].items() if record else ()
-            whole = all(digest((self.folder / name).read_bytes()) == was for name, was in files)
+            unchanged = all(
+                digest((self.folder / name).read_bytes()) == recorded for name, recorded in files
+            )
         except (OSError, KeyError, TypeError, AttributeError):
             return None
-        return record if whole else None
+        return record if unchanged else None
 
     def failure(self) -> dict[str, Any] | None:
         """How the last attempt failed, or None if it did not."""
@@ -119,29 +139,6 @@ class PointFolder(ABC):
             return None
 
 
-@dataclass(frozen=True)
-class Point(PointFolder):
-    """A point and where it is kept.
-
-    Attributes:
-        settings: what decides its result.
-        results: the folder of all results.
-    """
-
-    settings: Settings
-    results: Path
-
-    @cached_property
-    def identity(self) -> str:
-        """Hash of the settings: one for a point, whatever study or spelling it comes from."""
-        return digest(canonical_json(self.settings))[:32]
-
-    @cached_property
-    def source(self) -> str:
-        """Hash of all the project's source that the result depends on, as it is now."""
-        return point_source(self.settings.system.target)
-
-
 def point_source(target: str) -> str:
     """Hash of the source of a point with a system, given by its dotted name; runs none of it."""
-    return source_hash([point.__name__, target.rpartition(".")[0]])
+    return source_hash([POINT_CODE, target.rpartition(".")[0]])

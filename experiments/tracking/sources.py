@@ -13,17 +13,21 @@ from pathlib import Path
 from experiments.tracking.files import digest
 from experiments.tracking.trees import canonical_json
 
+# Imports from these packages count wherever they occur; of all other packages none does.
+_PROJECT = ("experiments", "mlci", "paper_figures")
+
 
 def source_hash(modules: Iterable[str]) -> str:
-    """Hash of the source of named modules and of all that they import from their own packages.
+    """Hash of the source of some modules and of all that they import, directly or not.
 
-    A module that is in no package counts with those that lie beside it. Sources are read, never
-    run: a name may come from a file of results.
+    Imports count from this project and from the packages of the modules themselves; for a module
+    in no package, from the modules and packages in its folder. Sources are read, never run: a name
+    may come from a file of results.
     """
     sources: dict[str, str] = {}
     waiting = list(modules)
-    packages = {name.partition(".")[0] for name in waiting} | {"mlci"}
-    packages |= {other for name in waiting if "." not in name for other in _beside(name)}
+    packages = {name.partition(".")[0] for name in waiting}.union(_PROJECT)
+    packages.update(*(_neighbours(name) for name in waiting if "." not in name))
     while waiting:
         name = waiting.pop()
         if name not in sources:
@@ -33,7 +37,7 @@ def source_hash(modules: Iterable[str]) -> str:
 
 
 @cache
-def _beside(name: str) -> frozenset[str]:
+def _neighbours(name: str) -> frozenset[str]:
     """Modules and packages in the folder of a module that somebody wrote for a study."""
     spec = _find(name)
     if spec is None or spec.origin is None or not os.path.isfile(spec.origin):
@@ -51,22 +55,22 @@ def _read_source(name: str) -> tuple[str, tuple[str, ...]]:
     if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
         return "", ()
     data = Path(spec.origin).read_bytes()
-    found: list[str] = []
+    imported: list[str] = []
     for node in ast.walk(ast.parse(data)):
         if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
+            imported += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             start = "." * node.level + (node.module or "")
             origin = importlib.util.resolve_name(start, spec.parent)
-            found.append(origin)
+            imported.append(origin)
             # `from package import module` names a module only if it is one.
             inner = [f"{origin}.{alias.name}" for alias in node.names]
-            found += [other for other in inner if other in _module_names(origin)]
-    return digest(data), tuple(found)
+            imported += [other for other in inner if other in _module_names(origin)]
+    return digest(data), tuple(imported)
 
 
 def _find(name: str) -> ModuleSpec | None:
-    """Where a module is, found without running the packages that it is in."""
+    """Where a module is, looked up without running the packages that it is in."""
     top, *inner = name.split(".")
     try:
         spec = importlib.util.find_spec(top)

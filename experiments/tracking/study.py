@@ -1,6 +1,7 @@
 """A study on disk: `study.json` lists its points and, once collated, what its tables came from.
 
 {"points": {identity: [override, ...], ...},     as planned when the sweep started
+ "examples": {name: ..., ...},                 what the study's file says under `examples`
  "collated": null or {
    "points": [identity, ...],                    in the order of the tables' rows
    "sources": {hash of the source: points, ...},
@@ -96,11 +97,13 @@ class Study:
     Attributes:
         folder: where it is kept.
         points: the overrides that make each point, by its identity, as they were planned.
+        examples: what the study's file says under `examples`, as a plain tree.
         collated: what its tables came from; None before they are written.
     """
 
     folder: Path
     points: Mapping[str, tuple[str, ...]]
+    examples: Mapping[str, Any]
     collated: Collated | None
 
     @property
@@ -109,7 +112,11 @@ class Study:
 
     def save(self) -> None:
         """Write the listing."""
-        tree = {"points": plain(self.points), "collated": plain(self.collated)}
+        tree = {
+            "points": plain(self.points),
+            "examples": plain(self.examples),
+            "collated": plain(self.collated),
+        }
         replace_file(self.folder / "study.json", json.dumps(tree, indent=1).encode() + b"\n")
 
 
@@ -142,21 +149,31 @@ def read_study(folder: Path) -> Study | None:
         raise StudyError(
             f"{path} cannot be read as a study; the study's own command writes it anew"
         ) from None
-    return Study(folder, points, collated)
+    return Study(folder, points, tree.get("examples", {}), collated)
 
 
-def write_plan(folder: Path, points: Sequence[tuple[Point, Sequence[str]]]) -> None:
-    """List the points of a sweep that starts, each with its overrides; tables stay as they are."""
+def write_plan(
+    folder: Path,
+    points: Sequence[tuple[Point, Sequence[str]]],
+    examples: Mapping[str, Any] | None = None,
+) -> None:
+    """List the points of a sweep that starts; what is listed of the tables stays.
+
+    Args:
+        folder: the study's.
+        points: each with the overrides that make it.
+        examples: what the study's file says under `examples`.
+    """
     before = whole_study(folder)
     planned = {point.identity: tuple(overrides) for point, overrides in points}
-    Study(folder, planned, before.collated if before else None).save()
+    Study(folder, planned, examples or {}, before.collated if before else None).save()
 
 
 def write_collated(folder: Path, collated: Collated) -> None:
     """List what the tables came from; the plan stays as it is."""
     before = whole_study(folder)
     points = before.points if before else {identity: () for identity in collated.points}
-    Study(folder, points, collated).save()
+    Study(folder, points, before.examples if before else {}, collated).save()
 
 
 def whole_study(folder: Path) -> Study | None:

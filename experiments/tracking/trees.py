@@ -1,21 +1,18 @@
-"""Plain nested values: one spelling for equal ones, and flat ones by dotted key."""
+"""Plain nested values: from dataclasses, as canonical JSON, and flat by dotted key."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    pass
-import dataclasses
+from typing import Any
 
 
 def canonical_json(value: Any) -> bytes:
     """One spelling for equal values: sorted keys, shortest exact numbers, no spaces.
 
     Raises:
-        TypeError: something that is neither settings nor JSON, an array for one.
+        TypeError: something that is neither a dataclass nor JSON, such as an array.
         ValueError: NaN or infinity.
     """
     text = json.dumps(plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from experiments.collate.join import collate
 from experiments.tracking.points import Point
+from experiments.tracking.trees import plain
 from tests.benchmark.configs import composed
 from tests.benchmark.timing import ROOT, Cost, Row, median_seconds
 
@@ -38,7 +39,9 @@ def sweep_rows(results: Path) -> tuple[list[Row], list[Cost]]:
     )
     run([*smallest(RUN), "study=sized"], results)
     points = [
-        Point(composed("scale=smoke", "truth=wall", f"temperature={number}"), results)
+        Point.planned(
+            plain(composed("scale=smoke", "truth=wall", f"temperature={number}")), results
+        )
         for number in range(1, RUN + 1)
     ]
     entries = list((results / "points").rglob("*"))

@@ -29,10 +29,11 @@ from experiments.app import version_base
 from experiments.collate.join import collate
 from experiments.config.paths import CONF
 from experiments.config.read import plain_tree, read_config
-from experiments.sweep import attempts as attempt
+from experiments.sweep import attempts
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.points import Point
 from experiments.tracking.store import Store
+from experiments.tracking.trees import plain
 
 KILLS = 20
 SEED = 2026
@@ -214,11 +215,10 @@ def collating(base: Path, limit: float = 5.0) -> None:
         settings, Store(base / "store"), lambda line: None
     )
     experiments.point.run.run_point = lambda *_: tables_of_one
-    points = [
-        Point(dataclasses.replace(settings, seed=seed), base / "collated") for seed in range(2000)
-    ]
-    for point in points:
-        attempt.run(point, lambda line: None)
+    seeded = [dataclasses.replace(settings, seed=seed) for seed in range(2000)]
+    points = [Point.planned(plain(each), base / "collated") for each in seeded]
+    for point, each in zip(points, seeded, strict=True):
+        attempts.run(point, each, lambda line: None)
     size = sum(path.stat().st_size for path in points[0].folder.iterdir())
     began = time.monotonic()
     collate(points, base / "collated" / "s")

@@ -6,11 +6,12 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from tiny_point import computed, planned
 
 from experiments.collate import examples
 from experiments.collate.examples import example_tables
+from experiments.collate.settings_of import settings_of
 from experiments.config.settings import GridSettings, Region, Settings, TruthSettings
-from experiments.sweep import attempts as attempt
 from experiments.tracking.points import Point
 from mlci.grids import Grid
 
@@ -28,16 +29,20 @@ def points(settings: Settings, tmp_path_factory: pytest.TempPathFactory) -> list
     more = dataclasses.replace(settings.demonstrations, pairs=20, keep=8)
     settings = dataclasses.replace(settings, horizon=4.0, demonstrations=more)
     found = [
-        Point(
+        computed(
             dataclasses.replace(settings, grid=grid_of(settings, shape), dt=dt, seed=seed), results
         )
         for shape in SHAPES
         for dt in (0.25, 0.5)
         for seed in ((0, 1) if shape == (24, 12) else (0,))
     ]
-    for point in found:
-        attempt.run(point, print)
     return found
+
+
+def values(point: Point) -> tuple[tuple[int, ...], float, int]:
+    """Grid, time step and seed of a point."""
+    settings = settings_of(point)
+    return settings.grid.shape, settings.dt, settings.seed
 
 
 def table_of(point: Point, name: str) -> pd.DataFrame:
@@ -49,8 +54,7 @@ def test_example_is_the_point_nearest_to_the_papers(
 ) -> None:
     monkeypatch.setattr(examples, "_PATH_EVERY", 3)  # leaves out the last of 17 samples
     tables = example_tables(points)
-    (example,) = (p for p in points if p.settings.grid.shape == (24, 12) and p.settings.dt == 0.25
-                  and p.settings.seed == 0)  # fmt: skip
+    (example,) = (p for p in points if values(p) == ((24, 12), 0.25, 0))
     ranking = tables["example_ranking"]
     assert set(ranking["point"]) == {example.identity}
     own = table_of(example, "hypotheses")
@@ -73,7 +77,7 @@ def test_example_is_the_point_nearest_to_the_papers(
 
 def test_cells_and_moves_have_their_corners(points: list[Point]) -> None:
     tables = example_tables(points)
-    space = points[0].settings.model.space
+    space = settings_of(points[0]).model.space
     cells = tables["example_cells"]
     grid = Grid(space, (24, 12))
     sides = [[f"{side}_{name}" for name in space.names] for side in ("lower", "upper")]
@@ -89,9 +93,11 @@ def test_compared_trial_is_feasible_in_all_grids_and_passes_nearest(points: list
     tables = example_tables(points)
     visits = tables["compared_cells"]
     alike = [point for point in points if point.identity in set(visits["point"])]
-    assert [point.settings.grid.shape for point in alike] == [SHAPES[0], SHAPES[2]]
-    assert {point.settings.seed for point in alike} == {0}
-    assert visits["cells"].unique().tolist() == [math.prod(p.settings.grid.shape) for p in alike]
+    assert [settings_of(point).grid.shape for point in alike] == [SHAPES[0], SHAPES[2]]
+    assert {settings_of(point).seed for point in alike} == {0}
+    assert visits["cells"].unique().tolist() == [
+        math.prod(settings_of(p).grid.shape) for p in alike
+    ]
     feasible = set.intersection(
         *(set(t["trial"][t["feasible"]]) for t in (table_of(p, "trials") for p in alike))
     )
@@ -110,7 +116,7 @@ def test_compared_trial_is_feasible_in_all_grids_and_passes_nearest(points: list
     violations = tables["compared_violations"]
     for point in alike:
         own = table_of(point, "violations")
-        shown = violations[violations["cells"] == math.prod(point.settings.grid.shape)]
+        shown = violations[violations["cells"] == math.prod(settings_of(point).grid.shape)]
         columns = ["trial", "source", "hypothesis"]
         expected = own[own["trial"] == trial][columns].to_numpy().tolist()
         assert expected
@@ -127,7 +133,7 @@ def test_time_step_is_one_at_which_nearly_all_can_be_followed(
         dt: min(
             int(table_of(p, "trials")["feasible"].sum())
             for p in points
-            if p.settings.dt == dt and p.settings.grid.shape != SHAPES[1]
+            if settings_of(p).dt == dt and settings_of(p).grid.shape != SHAPES[1]
         )
         for dt in (0.25, 0.5)
     }
@@ -137,7 +143,7 @@ def test_time_step_is_one_at_which_nearly_all_can_be_followed(
     assert dts() == {0.25}
     (trial,) = example_tables(points)["compared_cells"]["trial"].unique()
     for point in points:
-        if point.settings.dt == 0.25 and point.settings.grid.shape != SHAPES[1]:
+        if settings_of(point).dt == 0.25 and settings_of(point).grid.shape != SHAPES[1]:
             trials = table_of(point, "trials").set_index("trial")
             assert trials["feasible"][trial]
 
@@ -149,11 +155,9 @@ def test_order_of_points_does_not_matter_and_truths_stand_apart(points: list[Poi
 
 
 def test_example_has_the_settings_of_most_points(points: list[Point]) -> None:
-    own, results = points[0].settings, points[0].results
-    cold = Point(dataclasses.replace(own, temperature=0.5), results)
-    often = Point(dataclasses.replace(own, rollouts=2), results)
-    for point in (cold, often):
-        attempt.run(point, print)
+    own, results = settings_of(points[0]), points[0].results
+    cold = computed(dataclasses.replace(own, temperature=0.5), results)
+    often = computed(dataclasses.replace(own, rollouts=2), results)
     # All are equally near; temperature 0.5 comes first in tables.
     for order in ([cold, points[0], often], [often, points[0], cold]):
         assert set(example_tables(order)["example_ranking"]["point"]) == {points[0].identity}
@@ -162,13 +166,11 @@ def test_example_has_the_settings_of_most_points(points: list[Point]) -> None:
 def test_first_are_those_of_the_point_with_the_settings_of_most(points: list[Point]) -> None:
     def point(dt: float) -> Point:
         wanted = SHAPES[1], dt, 0
-        (found,) = (
-            p for p in points if (p.settings.grid.shape, p.settings.dt, p.settings.seed) == wanted
-        )
+        (found,) = (p for p in points if values(p) == wanted)
         return found
 
     near, usual = point(0.25), point(0.5)
-    most = [p for p in points if p.settings.dt == 0.5 or p.settings.seed == 1]
+    most = [p for p in points if settings_of(p).dt == 0.5 or settings_of(p).seed == 1]
     tables = example_tables([near, *most])
     assert set(tables["example_ranking"]["point"]) == {near.identity}
     ranking = tables["first_ranking"]
@@ -188,7 +190,7 @@ def test_first_are_those_of_the_point_with_the_settings_of_most(points: list[Poi
 
 
 def test_first_violations_are_those_of_demonstrations_with_corners(points: list[Point]) -> None:
-    tables = example_tables([point for point in points if point.settings.dt == 0.5])
+    tables = example_tables([point for point in points if settings_of(point).dt == 0.5])
     violations, shown = tables["first_violations"], set(tables["first_ranking"]["point"])
     (usual,) = (point for point in points if point.identity in shown)
     own = table_of(usual, "violations")
@@ -208,15 +210,13 @@ def test_first_violations_are_those_of_demonstrations_with_corners(points: list[
 
 
 def test_each_kind_of_tasks_has_a_first_ranking(points: list[Point]) -> None:
-    settings, results = points[0].settings, points[0].results
+    settings, results = settings_of(points[0]), points[0].results
     box = Region((-0.6, -0.2), (0.0, 0.6))  # a mass can pass it on either side
     plain = dataclasses.replace(settings, truth=TruthSettings("box", (box,), None))
     tasks = dataclasses.replace(plain.tasks, crossing=True)
     crossing = dataclasses.replace(plain, tasks=tasks)
     cold = dataclasses.replace(crossing, temperature=0.5)
-    made = [Point(each, results) for each in (plain, crossing, cold)]
-    for point in made:
-        attempt.run(point, print)
+    made = [computed(each, results) for each in (plain, crossing, cold)]
     kept = [sorted(table_of(point, "trials")["trial"]) for point in made[:2]]
     assert kept[0] != kept[1]
     for order in (made, made[::-1]):
@@ -230,11 +230,10 @@ def test_each_kind_of_tasks_has_a_first_ranking(points: list[Point]) -> None:
 
 
 def test_many_truths_have_no_examples(points: list[Point]) -> None:
+    settings = settings_of(points[0])
     named = [
-        Point(
-            dataclasses.replace(
-                points[0].settings, truth=dataclasses.replace(points[0].settings.truth, name=name)
-            ),
+        planned(
+            dataclasses.replace(settings, truth=dataclasses.replace(settings.truth, name=name)),
             points[0].results,
         )
         for name in "abcde"

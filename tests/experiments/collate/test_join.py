@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from tiny_point import hopeless
+from tiny_point import computed, hopeless, planned
 
 from experiments.collate.examples import example_tables
 from experiments.collate.join import CollateError, collate
+from experiments.collate.settings_of import settings_of
 from experiments.config.settings import Settings
 from experiments.point.run import run_point
 from experiments.point.tables import TRUTH_TABLES, table_bytes
-from experiments.sweep import attempts as attempt
 from experiments.tracking.files import csv_bytes, digest
 from experiments.tracking.points import Point
 from experiments.tracking.store import Store
@@ -27,9 +27,7 @@ NUMBERS = [1 / 3, 1e-300, 5e-324, -0.1, -0.0, 2**53 + 1.0, np.nextafter(1, 2), n
 
 
 def finished(settings: Settings, results: Path, **changes: object) -> Point:
-    point = Point(dataclasses.replace(settings, **changes), results)
-    attempt.run(point, print)
-    return point
+    return computed(dataclasses.replace(settings, **changes), results)
 
 
 def rewrite_record(point: Point, **changes: object) -> None:
@@ -56,11 +54,11 @@ def test_finished_point_has_a_record_and_exact_tables(settings: Settings, tmp_pa
     assert list(table.columns[:6]) == ["truth", "cells", "actions", "dt", "samples", "seed"]
     assert table.iloc[0, :6].tolist() == ["wall", 96, 3, 0.5, 1, 1]
     lines: list[str] = []
-    computed = run_point(point.settings, Store(tmp_path / "store"), lines.append)
-    assert {path.stem for path in point.folder.glob("*.csv")} == set(computed)
-    for name, frame in computed.items():
+    by_name = run_point(settings_of(point), Store(tmp_path / "store"), lines.append)
+    assert {path.stem for path in point.folder.glob("*.csv")} == set(by_name)
+    for name, frame in by_name.items():
         table = pd.read_csv(point.folder / f"{name}.csv")
-        opening = len(TRUTH_TABLES.get(name, point.settings.columns))
+        opening = len(TRUTH_TABLES.get(name, settings_of(point).columns))
         assert list(table.columns[opening:]) == list(frame.columns)
         for column in frame.columns:
             np.testing.assert_array_equal(table[column], frame[column])
@@ -97,16 +95,16 @@ def test_point_that_is_not_whole_is_not_done(harm: str, settings: Settings, tmp_
         (point.folder / "trials.csv").unlink()
     else:
         rewrite_record(point, source="edited")
-    assert not Point(settings, tmp_path).is_done()
+    assert not planned(settings, tmp_path).is_done()
 
 
 def test_point_that_fails_is_not_done_and_keeps_its_traceback(
     settings: Settings, tmp_path: Path
 ) -> None:
-    point = Point(hopeless(settings), tmp_path)
+    point = planned(hopeless(settings), tmp_path)
     with pytest.raises(RuntimeError, match="no demonstration was kept"):
-        attempt.run(point, print)
-    assert not Point(point.settings, tmp_path).is_done()
+        computed(hopeless(settings), tmp_path)
+    assert not Point(tmp_path, point.identity).is_done()
     first, second, *rest = (point.folder / "log.txt").read_text().splitlines()
     assert first.startswith("demonstrations  0 of 6 kept")
     assert second.startswith("Traceback")
@@ -187,7 +185,7 @@ def test_cases_that_are_named_join_the_measures(settings: Settings, tmp_path: Pa
 
 
 def test_collate_refuses_an_unfinished_point(settings: Settings, tmp_path: Path) -> None:
-    done, missing = finished(settings, tmp_path), Point(settings, tmp_path / "elsewhere")
+    done, missing = finished(settings, tmp_path), planned(settings, tmp_path / "elsewhere")
     with pytest.raises(CollateError, match=f"point {missing.identity} is not finished"):
         collate([done, missing], tmp_path / "study")
     assert not (tmp_path / "study").exists()
@@ -238,7 +236,7 @@ def test_refused_collate_leaves_all_old_tables(settings: Settings, tmp_path: Pat
 def test_listing_keeps_plan_and_tables_apart(settings: Settings, tmp_path: Path) -> None:
     points = [finished(settings, tmp_path, seed=seed) for seed in (1, 0)]
     folder = tmp_path / "study"
-    write_plan(folder, [(point, [f"seed={point.settings.seed}"]) for point in points])
+    write_plan(folder, [(point, [f"seed={point.config['seed']}"]) for point in points])
     planned = read_study(folder)
     assert planned is not None
     assert planned.points == {points[0].identity: ("seed=1",), points[1].identity: ("seed=0",)}
@@ -255,7 +253,7 @@ def test_listing_keeps_plan_and_tables_apart(settings: Settings, tmp_path: Path)
         assert digest((folder / "tables" / name).read_bytes()) == was
     assert study.collated.started[0] <= study.collated.started[1]
     # Another sweep that starts, and ends, in the same way.
-    write_plan(folder, [(point, [f"seed={point.settings.seed}"]) for point in points])
+    write_plan(folder, [(point, [f"seed={point.config['seed']}"]) for point in points])
     assert (folder / "study.json").read_bytes() == listing
     collate(points, folder)
     assert (folder / "study.json").read_bytes() == listing

@@ -11,7 +11,7 @@ import pytest
 from refusals import refusal
 
 from experiments.config.paths import CHECKOUT
-from experiments.tracking import store
+from experiments.tracking import sources
 from experiments.tracking.points import point_source
 
 SECTION = (CHECKOUT / "README.md").read_text().split("\n## Your own system\n")[1].split("\n## ")[0]
@@ -103,7 +103,7 @@ def test_source_counts_what_a_module_imports_from_beside_it(
     for helper, other in (("a = 1", "b = 1"), ("a = 2", "b = 1"), ("a = 2", "b = 2")):
         (tmp_path / "beside_it.py").write_text(helper)
         (tmp_path / "not_imported.py").write_text(other)
-        for cached in (store._read_source, store._module_names, store._beside):
+        for cached in (sources._read_source, sources._module_names, sources._neighbours):
             cached.cache_clear()
         hashes.append(point_source("mine_own.Mine"))
     assert hashes[0] != hashes[1] == hashes[2]

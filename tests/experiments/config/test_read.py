@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from refusals import refusal
-from tiny_point import composed
+from tiny_point import composed, planned
 
 from experiments.config.paths import CONF
 from experiments.config.read import ConfigError, read_config
 from experiments.config.schema import Problems, parse
-from experiments.tracking.points import Point
 
 
 def options(group: str) -> list[str]:
@@ -20,7 +19,7 @@ def options(group: str) -> list[str]:
 
 
 def identity(*overrides: str) -> str:
-    return Point(read_config(composed(*overrides))[0], Path()).identity
+    return planned(read_config(composed(*overrides))[0], Path()).identity
 
 
 def suits(system: str, truth: str) -> bool:
@@ -114,7 +113,7 @@ def test_every_setting_changes_identity() -> None:
 
     found = variants(settings)
     assert len(found) > 30
-    assert len({Point(other, Path()).identity for other in [settings, *found]}) == len(found) + 1
+    assert len({planned(other, Path()).identity for other in [settings, *found]}) == len(found) + 1
 
 
 CASES = "hydra.sweeper.cases="

@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from tiny_point import hopeless
+from tiny_point import computed, hopeless, planned
 
 from experiments import results
 from experiments.collate.join import collate
 from experiments.config.settings import Settings
-from experiments.sweep import attempts as attempt
 from experiments.tracking.points import Point
 from experiments.tracking.study import write_plan
 from paper_figures.figure_notes import figure_note, write_note
@@ -30,15 +29,13 @@ TABLES = (
 
 
 def finished(settings: Settings, folder: Path, **changes: object) -> Point:
-    point = Point(dataclasses.replace(settings, **changes), folder)
-    attempt.run(point, print)
-    return point
+    return computed(dataclasses.replace(settings, **changes), folder)
 
 
 def swept(settings: Settings, folder: Path, study: str, **values: float) -> list[Point]:
     """A study of finished points, collated."""
     points = [finished(settings, folder, dt=dt, seed=values.get("seed", 0)) for dt in (1.0, 0.5)]
-    write_plan(folder / study, [(point, [f"dt={point.settings.dt}"]) for point in points])
+    write_plan(folder / study, [(point, [f"dt={point.config['dt']}"]) for point in points])
     collate(points, folder / study)
     return points
 
@@ -86,14 +83,15 @@ def row(text: str, start: str) -> list[str]:
 def test_every_state_is_counted(settings: Settings, tmp_path: Path, look) -> None:
     done, stale = swept(settings, tmp_path, "s")
     outdate(stale)
-    failed = Point(dataclasses.replace(hopeless(settings), dt=0.25), tmp_path)
+    no_goal = dataclasses.replace(hopeless(settings), dt=0.25)
+    failed = planned(no_goal, tmp_path)
     with pytest.raises(RuntimeError, match="no demonstration was kept"):
-        attempt.run(failed, print)
-    running = Point(dataclasses.replace(settings, dt=0.2), tmp_path)
+        computed(no_goal, tmp_path)
+    running = planned(dataclasses.replace(settings, dt=0.2), tmp_path)
     running.folder.mkdir()
-    missing = Point(dataclasses.replace(settings, dt=0.1), tmp_path)
+    missing = planned(dataclasses.replace(settings, dt=0.1), tmp_path)
     points = [done, stale, failed, running, missing]
-    write_plan(tmp_path / "s", [(point, [f"dt={point.settings.dt}"]) for point in points])
+    write_plan(tmp_path / "s", [(point, [f"dt={point.config['dt']}"]) for point in points])
     tables = sorted(path.name for path in (tmp_path / "s" / "tables").iterdir())
     assert {path.name for path in done.folder.glob("*.csv")} < set(tables)
     with running.lock:
@@ -108,7 +106,7 @@ def test_every_state_is_counted(settings: Settings, tmp_path: Path, look) -> Non
             points, ["done", "stale", "failed", "running", "missing"], strict=True
         ):
             line = row(out, point.identity[:12])
-            assert line[1:3] == [state, f"dt={point.settings.dt}"]
+            assert line[1:3] == [state, f"dt={point.config['dt']}"]
         _, out, _ = look("list", "s", "--state", "failed", "--state", "stale")
         assert [line.split()[0] for line in out.splitlines()[1:]] == [
             stale.identity[:12],
@@ -136,12 +134,12 @@ def test_query_finds_by_config_and_summary(
     conditions: list[str], dts: list[float], settings: Settings, tmp_path: Path, look
 ) -> None:
     points = swept(settings, tmp_path, "s")
-    crossed = {point.settings.dt: float(summary(point)["cells_crossed"]) for point in points}
+    crossed = {point.config["dt"]: float(summary(point)["cells_crossed"]) for point in points}
     assert crossed[0.5] < 2 < crossed[1.0]
     status, out, _ = look("query", *conditions)
     assert status == 0
     for point in points:
-        assert (point.identity[:12] in out) == (point.settings.dt in dts)
+        assert (point.identity[:12] in out) == (point.config["dt"] in dts)
 
 
 def test_show_tells_config_record_and_results(settings: Settings, tmp_path: Path, look) -> None:
@@ -294,7 +292,7 @@ def test_clean_keeps_points_of_old_tables_and_the_store_of_unfinished_studies(
     settings: Settings, tmp_path: Path, look
 ) -> None:
     swept(settings, tmp_path, "s")
-    missing = Point(dataclasses.replace(settings, dt=0.1), tmp_path)
+    missing = planned(dataclasses.replace(settings, dt=0.1), tmp_path)
     write_plan(tmp_path / "s", [(missing, ["dt=0.1"])])
     loose = finished(settings, tmp_path, seed=5)
     before = everything(tmp_path)
@@ -385,9 +383,9 @@ def test_status_tells_why_not(
             outdate(point)
         collate(points, tmp_path / "s")
     elif harm == "rerun":
-        attempt.run(points[0], print, force=True)
+        computed(dataclasses.replace(settings, dt=1.0), tmp_path, force=True)
     else:
-        missing = Point(dataclasses.replace(settings, dt=0.1), tmp_path)
+        missing = planned(dataclasses.replace(settings, dt=0.1), tmp_path)
         write_plan(tmp_path / "s", [(missing, [])])
     _, out, _ = look("status")
     for start, told in (("  tables", tables), ("  figure", figure)):

@@ -11,20 +11,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from hydra import compose, initialize_config_dir
-from tiny_point import hopeless
+from tiny_point import composed, computed, hopeless, planned
 
-from experiments.app import version_base
-from experiments.config.paths import CONF
-from experiments.config.read import plain_tree, read_config
+from experiments.config.read import read_config
 from experiments.config.settings import Settings
-from experiments.sweep import attempts as attempt
-from experiments.sweep.plugins import register_plugins
-from experiments.tracking import environment as surroundings
+from experiments.sweep import attempts
+from experiments.tracking import environment
 from experiments.tracking.points import Point, State
 
 # Changing this makes every point of every study anew: only when what a point is has changed.
 DEFAULT_POINT = "4eb828fd093491d20e0f080f71362122"
+COLUMNS = ["truth", "cells", "actions", "dt", "samples", "seed"]
 HOLDER = """
 import sys, time
 from filelock import FileLock
@@ -34,15 +31,9 @@ with FileLock(sys.argv[1]):
 """
 
 
-def composed(*overrides: str) -> Settings:
-    register_plugins()
-    with initialize_config_dir(str(CONF), **version_base()):
-        return read_config(plain_tree(compose("config", list(overrides))))[0]
-
-
 @pytest.fixture
 def point(settings: Settings, tmp_path: Path) -> Point:
-    return Point(settings, tmp_path)
+    return planned(settings, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -55,24 +46,24 @@ def point(settings: Settings, tmp_path: Path) -> Point:
     ],
 )
 def test_identity_is_pinned_whatever_the_spelling(overrides: list[str]) -> None:
-    assert Point(composed(*overrides), Path()).identity == DEFAULT_POINT
+    assert planned(read_config(composed(*overrides))[0], Path()).identity == DEFAULT_POINT
 
 
-def test_state_follows_a_point(point: Point) -> None:
+def test_state_follows_a_point(point: Point, settings: Settings) -> None:
     assert point.state() is State.MISSING
     assert not point.folder.exists()
-    attempt.run(point, print)
+    attempts.run(point, settings, print)
     assert point.state() is State.DONE
     record = point.folder / "record.json"
     record.write_text(json.dumps(json.loads(record.read_text()) | {"source": "before an edit"}))
     assert point.state() is State.STALE
-    attempt.run(point, print)
+    attempts.run(point, settings, print)
     assert point.state() is State.DONE
     assert point.record()["source"] == point.source
     assert point.record()["attempt"] == 2
-    wrong = Point(hopeless(point.settings), point.results)
+    wrong = planned(hopeless(settings), point.results)
     with pytest.raises(RuntimeError, match="no demonstration was kept") as caught:
-        attempt.run(wrong, print)
+        computed(hopeless(settings), point.results)
     assert wrong.state() is State.FAILED
     failure = wrong.failure()
     assert (failure["reason"], failure["attempt"]) == ("raised", 1)
@@ -80,36 +71,36 @@ def test_state_follows_a_point(point: Point) -> None:
     assert "in run_point" in failure["traceback"]
 
 
-def test_point_runs_as_long_as_its_holder_lives(point: Point) -> None:
+def test_point_runs_as_long_as_its_holder_lives(point: Point, settings: Settings) -> None:
     point.folder.mkdir(parents=True)
     command = [sys.executable, "-c", HOLDER, str(point.folder / ".lock")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout is not None
         assert holder.stdout.readline() == "held\n"
         assert point.state() is State.RUNNING
-        assert attempt.run_apart(point) is State.RUNNING
+        assert attempts.run_apart(point, settings) is State.RUNNING
         holder.kill()
     deadline = time.monotonic() + 5
     while point.state() is State.RUNNING and time.monotonic() < deadline:
         time.sleep(0.01)
     assert point.state() is State.MISSING
-    assert attempt.bury(point, RuntimeError("killed"), 0)["reason"] == "died"
+    assert attempts.bury(point, RuntimeError("killed"), 0)["reason"] == "died"
     assert point.state() is State.FAILED
 
 
-def test_point_that_somebody_finished_is_not_run_again(point: Point) -> None:
-    attempt.run(point, print)
+def test_point_that_somebody_finished_is_not_run_again(point: Point, settings: Settings) -> None:
+    attempts.run(point, settings, print)
     before = (point.folder / "record.json").read_bytes()
-    assert attempt.run_apart(point) is State.DONE
+    assert attempts.run_apart(point, settings) is State.DONE
     assert (point.folder / "record.json").read_bytes() == before
 
 
-def test_attempt_clears_what_a_killed_one_left(point: Point) -> None:
+def test_attempt_clears_what_a_killed_one_left(point: Point, settings: Settings) -> None:
     point.folder.mkdir(parents=True)
     (point.folder / ".trials.csv-abc.part").touch()
     note = {"identity": point.identity, "attempt": 4}
     (point.folder / "attempt.json").write_text(json.dumps(note))
-    attempt.run(point, print)
+    attempts.run(point, settings, print)
     assert point.record()["attempt"] == 5
     assert {path.name for path in point.folder.iterdir()} == {
         *("trials.csv", "ranks.csv", "hypotheses.csv", "first.csv", "summary.csv"),
@@ -118,7 +109,9 @@ def test_attempt_clears_what_a_killed_one_left(point: Point) -> None:
     }
 
 
-def test_full_disk_is_a_failure_like_others(point: Point, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_is_a_failure_like_others(
+    point: Point, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
     replace = os.replace
     refused = []
 
@@ -130,7 +123,7 @@ def test_full_disk_is_a_failure_like_others(point: Point, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(os, "replace", refuse)
     with pytest.raises(OSError, match=r"No space left.*attempts.csv"):
-        attempt.run(point, print)
+        attempts.run(point, settings, print)
     assert point.state() is State.MISSING  # there was no room to say more
     assert refused == ["attempts.csv", "failure.json"]
 
@@ -138,12 +131,12 @@ def test_full_disk_is_a_failure_like_others(point: Point, monkeypatch: pytest.Mo
 def summary_row(point: Point) -> dict[str, float | None]:
     """What the point's own table holds, with None where it has no number."""
     table = pd.read_csv(point.folder / "summary.csv")
-    (row,) = table.drop(columns=list(point.settings.columns)).to_dict("records")
+    (row,) = table.drop(columns=COLUMNS).to_dict("records")
     return {name: None if np.isnan(value) else value for name, value in row.items()}
 
 
-def test_record_says_what_a_result_comes_from(point: Point) -> None:
-    attempt.run(point, print)
+def test_record_says_what_a_result_comes_from(point: Point, settings: Settings) -> None:
+    attempts.run(point, settings, print)
     record = point.record()
     assert record["config"]["grid"] == {"shape": [12, 8], "offset": None}
     assert record["summary"] == summary_row(point)
@@ -157,10 +150,9 @@ def test_record_says_what_a_result_comes_from(point: Point) -> None:
     assert 10 < record["peak_memory_mb"] < 10_000
 
 
-def test_record_has_null_where_a_summary_has_no_number(point: Point) -> None:
+def test_record_has_null_where_a_summary_has_no_number(settings: Settings, tmp_path: Path) -> None:
     # In so short a step no action leaves its cell, and no goal can be reached.
-    still = Point(dataclasses.replace(point.settings, dt=0.05), point.results)
-    attempt.run(still, print)
+    still = computed(dataclasses.replace(settings, dt=0.05), tmp_path)
     record = still.record()
     assert record["summary"] == summary_row(still)
     assert record["summary"]["feasible"] == 0
@@ -171,12 +163,12 @@ def test_peak_memory_is_that_of_the_point_alone() -> None:
     if not Path("/proc/self/clear_refs").exists():
         pytest.skip("this system does not forget peaks")
     big = np.ones(50_000_000)
-    assert surroundings.peak_memory() > big.nbytes // 1024**2
+    assert environment.peak_memory() > big.nbytes // 1024**2
     del big
-    surroundings.forget_peak_memory()
-    before = surroundings.peak_memory()
+    environment.reset_peak_memory()
+    before = environment.peak_memory()
     big = np.ones(25_000_000)
-    assert surroundings.peak_memory() - before == pytest.approx(big.nbytes / 1024**2, abs=20)
+    assert environment.peak_memory() - before == pytest.approx(big.nbytes / 1024**2, abs=20)
 
 
 def test_changes_since_the_commit_are_kept_once(
@@ -190,10 +182,10 @@ def test_changes_since_the_commit_are_kept_once(
         subprocess.run(["git", *author, *arguments], cwd=checkout, check=True, capture_output=True)
 
     def state() -> dict:
-        surroundings._git_state.cache_clear()
-        return surroundings.surroundings(results)["git"]
+        environment._git_state.cache_clear()
+        return environment.environment(results)["git"]
 
-    monkeypatch.setattr(surroundings, "CHECKOUT", checkout)
+    monkeypatch.setattr(environment, "CHECKOUT", checkout)
     git("init")
     (checkout / "code.py").write_text("old\n")
     git("add", ".")
@@ -217,4 +209,4 @@ def test_changes_since_the_commit_are_kept_once(
     git("apply", str(kept))
     assert (checkout / "code.py").read_text() == "edited\n"
     assert (checkout / "new.py").read_text() == "added\n"
-    surroundings._git_state.cache_clear()
+    environment._git_state.cache_clear()

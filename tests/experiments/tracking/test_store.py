@@ -11,6 +11,7 @@ import pytest
 
 import mlci.grids
 from experiments.config.settings import Region
+from experiments.tracking import files, sources
 from experiments.tracking import store as store_module
 from experiments.tracking.files import digest, replace_file
 from experiments.tracking.sources import source_hash
@@ -74,7 +75,7 @@ def test_edit_of_an_imported_module_changes_the_source_hash(
     monkeypatch.syspath_prepend(str(tmp_path))
 
     def hashed() -> str:
-        store_module._read_source.cache_clear()
+        sources._read_source.cache_clear()
         return source_hash(["edited.top"])
 
     before = hashed()
@@ -139,7 +140,7 @@ def test_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mo
     def full(*_: object) -> None:
         raise OSError("no space left")
 
-    monkeypatch.setattr(store_module.os, "replace", full)
+    monkeypatch.setattr(files.os, "replace", full)
     with pytest.raises(OSError, match="no space left"):
         replace_file(path, b"new")
     assert path.read_bytes() == b"old"
