@@ -44,7 +44,7 @@ TRACKING, POINT = "experiments.tracking", "mlci experiments.config experiments.t
 EVERYTHING = " ".join(PACKAGES)
 ROOMS = {
     TRACKING: "",
-    "experiments.config.paths": "",
+    "experiments.config.paths": TRACKING,
     "experiments.config": f"mlci {TRACKING}",
     "experiments.console": "mlci",
     "experiments.point": f"{POINT} experiments.console",
@@ -72,12 +72,11 @@ experiments.collate.join imports experiments.point.tables
 experiments.collate.reliability imports experiments.config.settings
 experiments.collate.reliability imports experiments.point.beliefs
 experiments.collate.reliability imports mlci.spaces
+experiments.collate.settings_of imports experiments.config.schema
+experiments.collate.settings_of imports experiments.config.settings
 experiments.config.paths imports experiments.config.settings
 experiments.lookback.archive imports experiments.config.schema
 experiments.lookback.freshness imports paper_figures.figure_notes
-experiments.tracking.environment imports experiments.config.paths
-experiments.tracking.points imports experiments.config.settings
-experiments.tracking.points imports experiments.point.run
 """
 
 LONGEST = 300  # lines of a module
