@@ -34,11 +34,11 @@ def safety_filter(safe_set):
 
 @pytest.fixture(scope="module")
 def study(safe_set, safety_filter):
-    """A hundred trials, what became of them, and how long that took [s]."""
-    trials = draw(safe_set, trials=100, margin=safety_filter.margin)
-    begun = time.perf_counter()
+    """Forty trials, what became of them, and the processor time of that [s]."""
+    trials = draw(safe_set, trials=40, margin=safety_filter.margin)
+    begun = time.process_time()
     attempts = demonstrate(PENDULUM, trials, TRUTHS, safety_filter, dt=DT)
-    return trials, attempts, time.perf_counter() - begun
+    return trials, attempts, time.process_time() - begun
 
 
 def draw(safe_set=None, **changes):
@@ -126,9 +126,9 @@ def test_a_goal_may_be_a_region():
 
 def test_what_is_kept_obeys_the_dynamics_the_truth_and_the_task(study):
     trials, attempts, seconds = study
-    assert seconds < 60
+    assert seconds < 24
     kept = [attempt for attempt in attempts if attempt.outcome is Outcome.KEPT]
-    assert len(kept) > 80
+    assert len(kept) > 32
     assert not [item for item in attempts if item.outcome is Outcome.TRUTH_ENTERED]
     for item, attempt in zip(trials, attempts, strict=True):
         shown = attempt.demonstration
@@ -185,7 +185,7 @@ def test_every_reason_is_named_and_the_gravest_wins():
 def test_limited_demonstrator_stays_in_the_control_box_and_out_of_the_truth(
     safe_set, safety_filter
 ):
-    trials = draw(safe_set, trials=12, margin=safety_filter.margin, horizon=3.0)
+    trials = draw(safe_set, trials=8, margin=safety_filter.margin, horizon=3.0)
     relaxed = SafetyFilter(PENDULUM, safe_set, DT, safety_filter.margin, 0.2)
     for filter_, limit in (
         (safety_filter, None),
@@ -197,7 +197,7 @@ def test_limited_demonstrator_stays_in_the_control_box_and_out_of_the_truth(
         assert peak > 3.0 if limit is None else peak <= 2.0
         outcomes = [each.outcome for each in attempts]
         assert Outcome.TRUTH_ENTERED not in outcomes
-        assert outcomes.count(Outcome.KEPT) >= 6
+        assert outcomes.count(Outcome.KEPT) >= 4
 
 
 def test_demonstrator_that_may_not_wind_goes_at_most_half_a_turn(safe_set):
