@@ -9,13 +9,13 @@ if __name__ == "__main__":  # before all that takes time to import: Ctrl-C ends 
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 import argparse
-import multiprocessing
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from paper_figures.drawing import draw_study
-from paper_figures.selection import Unsuited
+from experiments.config.paths import default_results
+from paper_figures.drawing import draw_studies
+
+_STOPPED = 130  # the exit status after Ctrl-C
 
 
 def main() -> int:
@@ -23,35 +23,38 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="paper_figures", description=__doc__)
     parser.add_argument("study", nargs="*", metavar="STUDY")
     parser.add_argument("--results", type=Path, help="folder of results", metavar="DIR")
-    chosen = parser.parse_args()
-    results = chosen.results or _default_results()
-    studies = chosen.study or sorted(path.parent.name for path in results.glob("*/tables"))
+    parser.add_argument(
+        *("--jobs", "-j"),
+        type=_job_count,
+        default=-1,
+        help="processes that draw, by default one a core (-1)",
+        metavar="N",
+    )
+    options = parser.parse_args()
+    results = options.results or default_results()
+    studies = options.study or sorted(path.parent.name for path in results.glob("*/tables"))
     if not studies:
         raise SystemExit(f"no study in {results}: run one first, python experiments/run.py -m ...")
-    with ProcessPoolExecutor(
-        min(len(studies), os.cpu_count() or 1),
-        mp_context=multiprocessing.get_context("spawn"),  # matplotlib is not made for forks
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_DFL),  # Ctrl-C ends it without a word
-    ) as pool:
-        drawing = [pool.submit(draw_study, results / study) for study in studies]
-        for drawn in drawing:
-            try:
-                for path in drawn.result():
-                    print(f"drawn: {path}", flush=True)
-            except Unsuited as reason:
-                if chosen.study:
-                    raise SystemExit(str(reason)) from None
-                print(f"nothing to draw: {reason}")
+    for drawing in draw_studies([results / study for study in studies], options.jobs):
+        for path in drawing.images:
+            print(f"drawn: {path}", flush=True)
+        if not drawing.images:
+            if options.study:
+                raise SystemExit(str(drawing))
+            print(f"nothing to draw: {drawing}")
     return 0
 
 
-def _default_results() -> Path:
-    """`results` of the checkout, or of the current folder where that lies outside of it."""
-    root, here = Path(__file__).resolve().parents[1], Path.cwd()
-    inside = (root / "conf" / "config.yaml").is_file() and here.is_relative_to(root)
-    return (root if inside else here) / "results"
+def _job_count(text: str) -> int:
+    """The number of processes that the command line asks for."""
+    if (number := int(text)) == 0:
+        raise argparse.ArgumentTypeError("0 processes draw nothing; -1 is one a core")
+    return number
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # joblib stops its workers
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        os._exit(_STOPPED)

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from paper_figures.selection import Unsuited
+from paper_figures.rows import Unsuited
 from paper_figures.style import GUIDE, PAGE, RC, STEP_COLOURS, STEP_MARKS, new_figure
 
 _KEYS = ("source", "demonstrations", "belief", "bin")
@@ -37,7 +37,7 @@ def draw(reliability: pd.DataFrame) -> Figure:
     Args:
         reliability: the table of that name.
     """
-    table = _checked(reliability)
+    table = _sorted(reliability)
     figure, grid = new_figure(
         PAGE, 0.7 + 1.85 * len(SOURCES), nrows=len(SOURCES), ncols=len(BELIEFS), sharey="col"
     )
@@ -49,13 +49,13 @@ def draw(reliability: pd.DataFrame) -> Figure:
                 _draw_frame(axes, panel, belief)
                 for place, number in enumerate(numbers):
                     style = place % len(STEP_MARKS)
-                    shown = panel[(panel["demonstrations"] == number) & _drawn(panel)]
+                    curve = panel[(panel["demonstrations"] == number) & _enough(panel)]
                     errors = np.array(
-                        [shown["observed"] - shown["low"], shown["high"] - shown["observed"]]
+                        [curve["observed"] - curve["low"], curve["high"] - curve["observed"]]
                     )
                     axes.errorbar(
-                        100 * shown["predicted"],
-                        100 * shown["observed"],
+                        100 * curve["predicted"],
+                        100 * curve["observed"],
                         yerr=100 * np.maximum(errors, 0),
                         color=STEP_COLOURS[style],
                         marker=STEP_MARKS[style],
@@ -76,7 +76,7 @@ def draw(reliability: pd.DataFrame) -> Figure:
 
 def facts(reliability: pd.DataFrame) -> str:
     """What the caption says."""
-    table = _checked(reliability)
+    table = _sorted(reliability)
     lines = [
         "Simulated worlds: each hypothesis as the truth, and none, as often as the prior says.",
         "Marks: of the beliefs in a bin of probabilities, the share that is right; dashed: equal.",
@@ -103,14 +103,18 @@ def facts(reliability: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
-def _checked(reliability: pd.DataFrame) -> pd.DataFrame:
-    """The table, if it holds one discretisation."""
+def _sorted(reliability: pd.DataFrame) -> pd.DataFrame:
+    """The table in the order of its keys.
+
+    Raises:
+        Unsuited: it holds more than one discretisation.
+    """
     if reliability.duplicated(list(_KEYS)).any():
         raise Unsuited(f"rows differ in more than {', '.join(_KEYS)}")
     return reliability.sort_values(list(_KEYS), kind="stable")
 
 
-def _drawn(panel: pd.DataFrame) -> pd.Series:
+def _enough(panel: pd.DataFrame) -> pd.Series:
     """Which rows are probabilities, and of enough beliefs."""
     return _proper(panel) & (panel["count"] >= FEW)
 

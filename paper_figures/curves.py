@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
-from paper_figures.selection import Unsuited, paper_rows
+from paper_figures.rows import Unsuited, paper_rows
 from paper_figures.style import mark
 
 COLUMNS = (
@@ -18,39 +18,37 @@ COLUMNS = (
 )
 
 _ASIDE = 0.025  # share of dt that neighbouring curves are apart
-_REACHED = 0.5  # below this share of goals that can be reached, a mean stands for few cases
+_FIRM = 0.5  # below this share of goals that can be reached, a mean stands for few cases
 _PALE = 0.4  # opacity of such a mean
 
 
 def paper_measure(measures: pd.DataFrame, measure: str) -> pd.DataFrame:
-    """The rows of one measure that a figure shows, with the column `reachable`.
+    """The rows of one measure that the paper's figures show, with the column `reachable`.
 
     Raises:
         Unsuited: there are none, or rows differ in more than truth, cells and dt, or in nothing.
     """
-    found = []
-    for name in (measure, "reachable"):
-        rows = measures[measures["measure"] == name]
-        if not len(rows):
+    keys = ["truth", "cells", "dt"]
+    tables = {name: measures[measures["measure"] == name] for name in (measure, "reachable")}
+    for name, table in tables.items():
+        if not len(table):
             raise Unsuited(f"table measures has no measure {name}")
-        found.append(paper_rows(rows, ("truth", "cells", "dt")))
-    rows, reachable = found
+    rows, reachable = (paper_rows(table, keys) for table in tables.values())
     if not rows.duplicated("truth").any():
         raise Unsuited("neither cells nor dt varies")
     share = reachable.rename(columns={"mean": "reachable"})
-    keys = ["truth", "cells", "dt"]
     return rows.merge(share[[*keys, "reachable"]], on=keys, how="left")
 
 
 def draw_curves(axes: Axes, rows: pd.DataFrame) -> None:
-    """Means against dt, a little aside of it so that no bar hides another; bars are intervals."""
+    """Draw means with their intervals against dt, moved aside so that no bar hides another."""
     groups = list(rows.groupby("cells", sort=True))
     for number, (cells, curve) in enumerate(groups):
         x = curve["dt"] * (1 + _ASIDE * (number - (len(groups) - 1) / 2))
         style = mark(int(cells), number)
-        firm = curve["mean"].where(curve["reachable"] >= _REACHED)
+        firm = curve["mean"].where(curve["reachable"] >= _FIRM)
         axes.plot(x, firm, color=style["color"], label=f"{cells} cells")
-        for few, part in curve.groupby(curve["reachable"] < _REACHED):
+        for few, part in curve.groupby(curve["reachable"] < _FIRM):
             axes.errorbar(
                 x[part.index],
                 part["mean"],
@@ -68,7 +66,7 @@ def draw_curves(axes: Axes, rows: pd.DataFrame) -> None:
 
 
 def legend_entries(rows: pd.DataFrame) -> list[Line2D]:
-    """A sign for each number of cells."""
+    """The legend's mark for each number of cells."""
     return [
         Line2D([], [], label=f"{cells} cells", **mark(int(cells), number))
         for number, cells in enumerate(sorted(rows["cells"].unique()))
@@ -86,7 +84,7 @@ def curve_facts(rows: pd.DataFrame, unit: str) -> Iterator[str]:
         )
 
 
-def shown_facts(rows: pd.DataFrame) -> Iterator[str]:
+def common_facts(rows: pd.DataFrame) -> Iterator[str]:
     """What holds for every curve of a figure."""
     yield (
         f"Actions: {rows['actions'].iloc[0]}; start points in a cell along each dimension: "
@@ -99,14 +97,21 @@ def shown_facts(rows: pd.DataFrame) -> Iterator[str]:
     )
     yield f"Uncertainty: bars are 95 % {how}."
     yield (
-        f"Pale, and not joined: the tabular agent reaches fewer than {100 * _REACHED:.0f} % of the "
+        f"Pale, and not joined: the tabular agent reaches fewer than {100 * _FIRM:.0f} % of the "
         "goals, and the mean is over those alone. No mark: it reaches none."
     )
     yield "Marks are moved a little aside of their dt, so that no bar hides another."
 
 
 def draw_dots(axes: Axes, values: pd.DataFrame, y: pd.Series, style: dict[str, str]) -> None:
-    """A mark and an interval for each value."""
+    """Draw a mark and an interval for each value.
+
+    Args:
+        axes: where.
+        values: value, lower and upper end of its interval, in this order.
+        y: the height of each.
+        style: colour, mark and label.
+    """
     middle, low, high = (values.iloc[:, column] for column in range(3))
     axes.errorbar(
         middle,

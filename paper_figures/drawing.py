@@ -1,116 +1,174 @@
-"""Every figure that there is, and how those that a study's tables allow are drawn."""
+"""The list of all figures, and how those that a study's tables allow are drawn."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
+import itertools
+import signal
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pandas as pd
+from joblib import Parallel, delayed
 
-from paper_figures import calibration_diagram as calibration
+from experiments.tracking.files import replace_file
 from paper_figures import (
+    calibration_diagram,
+    choice_effects,
     final_state_error,
     hypothesis_map,
-    in_cell,
     overview,
     rank_curve,
-    scale,
-    sensitivity,
+    sampled_trajectories,
+    start_points,
     state_space,
     success,
     success_cases,
-    trajectories,
+    time_and_memory,
     violation_distance,
 )
 from paper_figures.figure_notes import figure_note, read_note, sentence, write_note
-from paper_figures.selection import Unsuited
+from paper_figures.rows import Unsuited
 from paper_figures.style import save
 
-# Every figure there is. A module has
+# Every figure, by the name of its module, which its files have too. A module has
 #   TABLES        the tables that it needs, each with the columns that it needs of it;
 #   draw(**them)  the figure; it may raise Unsuited;
-#   facts(**them) what its caption says, a fact a line;
+#   facts(**them) what the caption must say, a fact a line;
 #   EACH          a column, if there is to be one figure for each of its values.
-FIGURES: tuple[ModuleType, ...] = (
-    overview,
-    state_space,
-    final_state_error,
-    violation_distance,
-    rank_curve,
-    trajectories,
-    hypothesis_map,
-    calibration,
-    in_cell,
-    scale,
-    sensitivity,
-    success,
-    success_cases,
-)
+FIGURES: Mapping[str, ModuleType] = {
+    module.__name__.rpartition(".")[2]: module
+    for module in (
+        overview,
+        state_space,
+        final_state_error,
+        violation_distance,
+        rank_curve,
+        sampled_trajectories,
+        hypothesis_map,
+        calibration_diagram,
+        start_points,
+        time_and_memory,
+        choice_effects,
+        success,
+        success_cases,
+    )
+}
 
 
-def draw_study(study: Path) -> list[Path]:
-    """Draw every figure that a study's tables allow into its folder `figures`.
+@dataclass
+class Drawing:
+    """The figures of a study, or of one module in it.
 
-    Returns:
-        The PNG of each; a PDF and the caption's facts as text are beside it.
-
-    Raises:
-        Unsuited: they allow none.
+    Attributes:
+        study: the study's folder.
+        images: the PNG of each figure; a PDF and the caption's facts as text are beside it.
+        notes: what is listed of each figure, by its name.
+        reasons: for each module that drew nothing, why.
     """
-    needed = {name for module in FIGURES for name in module.TABLES}
-    paths = {name: study / "tables" / f"{name}.csv" for name in sorted(needed)}
-    contents = {name: path.read_bytes() for name, path in paths.items() if path.is_file()}
-    tables = {name: pd.read_csv(io.BytesIO(data)) for name, data in contents.items()}
-    before, notes, reasons, drawn = read_note(study), {}, [], []
-    source = sentence(study)
-    for module in FIGURES:
-        name = module.__name__.rpartition(".")[2]
-        try:
-            for suffix, chosen in _versions(module, tables):
-                path = study / "figures" / f"{name}{suffix}"
-                drawn.append(save(module.draw(**chosen), path, source))
-                lines = [module.facts(**chosen), "", f"Source: {source}."]
-                path.with_name(path.name + ".txt").write_text("\n".join(lines) + "\n")
-                used = {f"{table}.csv": contents[table] for table in chosen}
-                notes[path.name] = figure_note(path, name, used)
-        except Unsuited as reason:
-            reasons.append(f"{name}: {reason}")
-            # What cannot be drawn again stays listed, and `status` tells what is wrong with it.
-            kept = {figure: note for figure, note in before.items() if note["module"] == name}
-            notes |= kept
-            if kept:
-                print(f"{study.name}: not drawn again: {reasons[-1]}")
-    if not drawn:
-        raise Unsuited(
-            f"the tables in {study / 'tables'} make no figure ({'; '.join(reasons)}); run the "
-            f"study first, python experiments/run.py -m experiment={study.name}"
+
+    study: Path
+    images: list[Path] = field(default_factory=list)
+    notes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        """Why there are no images."""
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in self.reasons.items())
+        return (
+            f"the tables in {self.study / 'tables'} make no figure ({reasons}); run the study "
+            f"first, python experiments/run.py -m experiment={self.study.name}"
         )
-    write_note(study, notes)
-    return drawn
+
+
+def draw_studies(studies: Sequence[Path], jobs: int = 1) -> Iterator[Drawing]:
+    """Draw every figure that the tables of each study allow into its folder `figures`.
+
+    Args:
+        studies: their folders.
+        jobs: processes that draw, as joblib counts them; -1 for one a core.
+
+    Yields:
+        the drawing of each study, in their order, once its figures are written and listed.
+    """
+    parallel = Parallel(n_jobs=jobs, return_as="generator", initializer=_die_at_once)
+    parts = parallel(delayed(_draw)(study, name) for study in studies for name in FIGURES)
+    for study in studies:
+        yield _listed(study, itertools.islice(parts, len(FIGURES)))
+
+
+def _die_at_once() -> None:
+    """Make Ctrl-C end a worker process without a traceback."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _draw(study: Path, name: str) -> Drawing:
+    """Draw the figures of one module."""
+    module, drawing, source = FIGURES[name], Drawing(study), sentence(study)
+    try:
+        contents = _contents(study, module)
+        for suffix, tables in _versions(module, contents):
+            path = study / "figures" / f"{name}{suffix}"
+            drawing.images.append(save(module.draw(**tables), path, source))
+            text = f"{module.facts(**tables)}\n\nSource: {source}.\n"
+            replace_file(path.with_name(path.name + ".txt"), text.encode())
+            files = {f"{table}.csv": content for table, content in contents.items()}
+            drawing.notes[path.name] = figure_note(path, name, files)
+    except Unsuited as reason:
+        drawing.reasons[name] = str(reason)
+    return drawing
+
+
+def _contents(study: Path, module: ModuleType) -> dict[str, bytes]:
+    """The files of the tables that a module needs."""
+    paths = {name: study / "tables" / f"{name}.csv" for name in module.TABLES}
+    for name, path in paths.items():
+        if not path.is_file():
+            raise Unsuited(f"there is no table {name}")
+    return {name: path.read_bytes() for name, path in paths.items()}
 
 
 def _versions(
-    module: ModuleType, tables: Mapping[str, pd.DataFrame]
+    module: ModuleType, contents: Mapping[str, bytes]
 ) -> Iterator[tuple[str, dict[str, pd.DataFrame]]]:
-    """The tables that a figure is drawn from, or each of its figures, whose names have a suffix."""
+    """The tables of each figure that a module draws, with the end of the figure's name."""
+    tables = {name: pd.read_csv(io.BytesIO(content)) for name, content in contents.items()}
     for name, columns in module.TABLES.items():
-        if name not in tables:
-            raise Unsuited(f"there is no table {name}")
         if missing := [column for column in columns if column not in tables[name]]:
             raise Unsuited(f"table {name} has no column {', '.join(missing)}")
-    chosen = {name: tables[name] for name in module.TABLES}
-    each = getattr(module, "EACH", None)
-    if each is None:
-        yield "", chosen
+    column = getattr(module, "EACH", None)
+    if column is None:
+        yield "", tables
         return
-    first = next(iter(chosen.values()))
-    for value in sorted(first[each].unique()):
+    first = next(iter(tables.values()))
+    for value in sorted(first[column].unique()):
         yield (
             f"_{value}",
             {
-                name: table[table[each] == value] if each in table else table
-                for name, table in chosen.items()
+                name: table[table[column] == value] if column in table else table
+                for name, table in tables.items()
             },
         )
+
+
+def _listed(study: Path, parts: Iterator[Drawing]) -> Drawing:
+    """The parts of a study's drawing as one, its figures listed beside them.
+
+    What cannot be drawn again stays listed, and `results.py status` tells what is wrong with it.
+    """
+    whole, before = Drawing(study), read_note(study)
+    for part in parts:
+        whole.images += part.images
+        whole.notes |= part.notes
+        whole.reasons |= part.reasons
+    for name, reason in whole.reasons.items():
+        old = {figure: note for figure, note in before.items() if note["module"] == name}
+        whole.notes = old | whole.notes
+        if old:
+            print(f"{study.name}: not drawn again: {name}: {reason}")
+    if whole.images:
+        write_note(study, whole.notes)
+    return whole

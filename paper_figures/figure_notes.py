@@ -19,7 +19,7 @@ from typing import Any
 NOTE = "figures.json"
 SUFFIXES = (".png", ".pdf", ".txt")
 # The modules that figures share; the others of this package draw one figure each.
-SHARED = ("curves", "plane", "selection", "style")
+SHARED = ("curves", "plane", "rows", "style")
 
 
 def drawing_source(module: str) -> str:

@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 
 from paper_figures.curves import (
     COLUMNS,
+    common_facts,
     curve_facts,
     draw_curves,
     legend_entries,
     paper_measure,
-    shown_facts,
 )
 from paper_figures.style import COLUMN, RC, new_figure
 
@@ -47,7 +47,7 @@ def facts(measures: pd.DataFrame) -> str:
     lines = [
         "Distance between the goal and where policies sampled from the tabular MDP end on the "
         "continuous dynamics, each dimension as a share of its range.",
-        *shown_facts(rows),
+        *common_facts(rows),
         "Values:",
         *curve_facts(rows, " of the ranges"),
     ]

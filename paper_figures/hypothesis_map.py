@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from paper_figures.plane import Plane, numbered, outline
-from paper_figures.selection import described
+from paper_figures.rows import described
 from paper_figures.style import COLUMN, EDGE, GAIN, PATH, RC, TRUTH, VIOLATED, new_figure
 
 TABLES = {
@@ -44,8 +44,8 @@ def draw(
         finite = gain[feasible & np.isfinite(gain)]
         top = max(float(finite.max(initial=0.0)), 1e-3)
         # Gains spread over decades: the square root keeps the small ones apart from none.
-        shown = np.sqrt(np.minimum(gain[feasible], top))
-        cells = plane.cells(axes, hypotheses[feasible], array=shown, cmap=GAIN)
+        root = np.sqrt(np.minimum(gain[feasible], top))
+        cells = plane.cells(axes, hypotheses[feasible], array=root, cmap=GAIN)
         cells.set_clim(0, np.sqrt(top))
         plane.cells(axes, hypotheses[~feasible], facecolor=VIOLATED)
         _draw_paths(axes, example_paths, plane)

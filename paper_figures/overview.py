@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from paper_figures.plane import Plane, axis_label, centre, numbered, outline
-from paper_figures.selection import Unsuited, described
+from paper_figures.rows import Unsuited, described
 from paper_figures.style import (
     CHANCE,
     DEMONSTRATION,
@@ -107,7 +107,7 @@ def facts(
         _of_first(table, example_regions)
         for table in (example_ranking, example_paths, example_cells)
     )
-    known = ranking[ranking["covered_by_truth"].astype(bool)]
+    inside = ranking[ranking["covered_by_truth"].astype(bool)]
     count = paths["demonstration"].nunique()
     trial = int(visits["trial"].iloc[0])
     lines = [
@@ -124,7 +124,7 @@ def facts(
         *(
             f"Rank of hypothesis {row.hypothesis}, inside the truth: {row.rank:g}, gain "
             f"{row.gain:.3g} nat, Phi in panel 3 {row.unconstrained:.3g}."
-            for row in known.itertuples()
+            for row in inside.itertuples()
         ),
         f"Trial {trial} is the one that would most likely violate the truth if it were allowed.",
         "Uncertainty: none is drawn; this is one run.",
@@ -153,14 +153,14 @@ def _draw_demonstrations(
 def _draw_moves(axes: Axes, visits: pd.DataFrame, moves: pd.DataFrame, plane: Plane) -> None:
     """The first cells of a trajectory, the moves from them and those that it takes."""
     first = visits.sort_values("step").head(_STEPS + 1)
-    shown = moves[moves["cell"].isin(first["cell"])].drop_duplicates(["cell", "successor"])
-    after = shown[[name for name in shown if name.startswith("successor_")]]
+    arrows = moves[moves["cell"].isin(first["cell"])].drop_duplicates(["cell", "successor"])
+    after = arrows[[name for name in arrows if name.startswith("successor_")]]
     after = after.rename(columns=lambda name: name.removeprefix("successor_"))
     visited: list[Rectangle] = []
     for box in plane.rectangles(first):
         visited.append(plane.beside(box, visited[-1]) if visited else box)
     place = dict(zip(first["cell"], visited, strict=True))
-    begins = [place[cell] for cell in shown["cell"]]
+    begins = [place[cell] for cell in arrows["cell"]]
     ends = [plane.beside(*pair) for pair in zip(plane.rectangles(after), begins, strict=True)]
     for box in {box.get_xy(): box for box in visited}.values():
         box.set(facecolor=SAMPLED, alpha=0.45, linewidth=0)
@@ -192,13 +192,13 @@ def _draw_chances(
     axes: Axes, ranking: pd.DataFrame, path: pd.DataFrame, plane: Plane
 ) -> PatchCollection:
     """Phi of every hypothesis, with the start and the end of the trial."""
-    drawn = plane.cells(axes, ranking, array=ranking["unconstrained"], cmap=CHANCE)
-    drawn.set_clim(0, 1)
+    cells = plane.cells(axes, ranking, array=ranking["unconstrained"], cmap=CHANCE)
+    cells.set_clim(0, 1)
     points = plane.line(path)
     for point, sign in ((points[0], "o"), (points[-1], "s")):
         axes.plot(*point, sign, color="black", markersize=3.5, markeredgecolor="white")
     plane.dress(axes)
-    return drawn
+    return cells
 
 
 def _draw_ranking(
@@ -208,21 +208,21 @@ def _draw_ranking(
     feasible = ranking[ranking["feasible"].astype(bool)]
     plane.cells(axes, ranking, facecolor=VIOLATED)
     root = np.sqrt(feasible["gain"].replace(np.inf, np.nan))
-    drawn = plane.cells(axes, feasible, array=root, cmap=GAIN)
-    drawn.set_clim(0, max(float(root.max()), 1e-3))
+    cells = plane.cells(axes, feasible, array=root, cmap=GAIN)
+    cells.set_clim(0, max(float(root.max()), 1e-3))
     best = feasible[(feasible["rank"] <= _NUMBERED) & (feasible["gain"] > 0)]
     for row, box in zip(best.itertuples(), plane.rectangles(best), strict=True):
         numbered(axes, box, row.rank, size=5)
     for box in plane.regions(boxes):
         axes.add_patch(outline(box, TRUTH, 1.6, linestyle="--"))
     plane.dress(axes)
-    return drawn
+    return cells
 
 
-def _bar(figure: Figure, axes: Axes, drawn: PatchCollection, label: str, power: int) -> None:
+def _bar(figure: Figure, axes: Axes, cells: PatchCollection, label: str, power: int) -> None:
     """A colour bar below a panel; the colours stand for values to the power of 1 / `power`."""
-    bar = figure.colorbar(drawn, ax=axes, location="bottom", aspect=25, pad=0.02)
-    ticks = np.linspace(0, drawn.get_clim()[1], 3)
+    bar = figure.colorbar(cells, ax=axes, location="bottom", aspect=25, pad=0.02)
+    ticks = np.linspace(0, cells.get_clim()[1], 3)
     bar.set_ticks(ticks.tolist(), labels=[f"{tick**power:.2g}" for tick in ticks])
     bar.set_label(label)
     bar.outline.set_linewidth(0.5)

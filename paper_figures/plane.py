@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.patches import Rectangle
 
-from paper_figures.selection import Unsuited
+from paper_figures.rows import Unsuited
 from paper_figures.style import EDGE
 
 _TURN_TICKS = {0.0: "0", 0.25: r"$\pi/2$", 0.5: r"$\pi$", 0.75: r"$3\pi/2$", 1.0: r"$2\pi$"}
@@ -70,9 +70,9 @@ class Plane:
     def cells(self, axes: Axes, boxes: pd.DataFrame, **style: Any) -> PatchCollection:
         """Draw boxes, their edges thin, coloured by `array` if one is given."""
         patches = self.rectangles(boxes) if "array" in style else self.regions(boxes)
-        drawn = PatchCollection(patches, **{"edgecolor": EDGE, "linewidth": 0.3, **style})
-        axes.add_collection(drawn)
-        return drawn
+        collection = PatchCollection(patches, **{"edgecolor": EDGE, "linewidth": 0.3, **style})
+        axes.add_collection(collection)
+        return collection
 
     def shadows(self, boxes: pd.DataFrame) -> pd.DataFrame:
         """One box of each place in the plane: those of further dimensions lie on one another."""
@@ -81,12 +81,14 @@ class Plane:
 
     def regions(self, boxes: pd.DataFrame) -> list[Rectangle]:
         """Each box, and its copies where it leaves a periodic dimension on one side."""
-        found = self.rectangles(boxes)
+        pieces = self.rectangles(boxes)
         for column, dimension in enumerate((self.x, self.y)):
             if dimension["periodic"]:
                 period = dimension["upper"] - dimension["lower"]
-                found = [copy for box in found for copy in _copies(box, column, dimension, period)]
-        return found
+                pieces = [
+                    copy for box in pieces for copy in _copies(box, column, dimension, period)
+                ]
+        return pieces
 
     def beside(self, box: Rectangle, other: Rectangle) -> Rectangle:
         """A box moved by whole periods to where its centre is nearest to that of another."""

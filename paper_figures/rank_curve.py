@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from paper_figures.selection import Unsuited, paper_rows
+from paper_figures.rows import PAPER, Unsuited, paper_rows
 from paper_figures.style import GUIDE, PAGE, RC, mark, new_figure
 
 TABLES = {
@@ -20,7 +20,6 @@ TABLES = {
         *("median", "q25", "q75", "median_low", "median_high", "seeds"),
     )
 }
-PAPER = 9  # demonstrations after which the paper finds the truth among the first
 
 _TICKS = (1, 2, 5, 10, 20, 50, 100)
 _MARKED = 4  # demonstrations between the marks of a curve
@@ -70,7 +69,7 @@ def draw(rank_curve: pd.DataFrame) -> Figure:
                 right.set_ylabel(f"in top {top} [%]")
         for axes in grid[-1]:
             axes.set_xlabel("demonstrations")
-        figure.legend(*_entries(grid[0][0]), loc="outside lower center", ncols=5)
+        figure.legend(*grid[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 
@@ -105,9 +104,8 @@ def facts(rank_curve: pd.DataFrame) -> str:
 
 def _top(rank_curve: pd.DataFrame) -> int:
     """Among how many first hypotheses the table counts the truth."""
-    (top,) = (
-        int(found[1]) for name in rank_curve if (found := re.fullmatch(r"share_top_(\d+)", name))
-    )
+    matches = (re.fullmatch(r"share_top_(\d+)", name) for name in rank_curve)
+    (top,) = (int(match[1]) for match in matches if match)
     return top
 
 
@@ -125,9 +123,3 @@ def _draw_share(axes: Axes, curve: pd.DataFrame, top: int, style: dict[str, Any]
     x = curve["demonstrations"]
     axes.fill_between(x, low, high, color=style["color"], alpha=0.15, linewidth=0)
     axes.plot(x, middle, **style)
-
-
-def _entries(axes: Axes) -> tuple[list[object], list[str]]:
-    """Signs and labels of the curves."""
-    handles, labels = axes.get_legend_handles_labels()
-    return handles, labels

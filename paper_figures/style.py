@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ matplotlib.use("agg")
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
+
+from experiments.tracking.files import replace_file
 
 COLUMN = 3.4  # width of a column [in]
 DPI = 200  # of PNGs
@@ -83,13 +86,15 @@ def save(figure: Figure, path: Path, source: str = "") -> Path:
     Returns:
         The PNG.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    png, pdf = (path.with_name(path.name + suffix) for suffix in (".png", ".pdf"))
+    # No time and no version of a program: both change bytes that show the same.
+    metadata = {
+        ".png": {"Title": path.name, "Source": source, "Software": None},
+        ".pdf": {"Title": path.name, "Subject": source, "CreationDate": None},
+    }
     with plt.rc_context(RC):
-        # No time and no version of a program: both change bytes that show the same.
-        metadata = {"Title": path.name, "Source": source, "Software": None}
-        figure.savefig(png, dpi=DPI, metadata=metadata)
-        metadata = {"Title": path.name, "Subject": source, "CreationDate": None}
-        figure.savefig(pdf, metadata=metadata)
+        for suffix, entries in metadata.items():
+            content = io.BytesIO()
+            figure.savefig(content, format=suffix[1:], dpi=DPI, metadata=entries)
+            replace_file(path.with_name(path.name + suffix), content.getvalue())
     plt.close(figure)
-    return png
+    return path.with_name(f"{path.name}.png")

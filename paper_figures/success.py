@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from paper_figures.plane import Plane, numbered
-from paper_figures.selection import ALL_TASKS, DEFAULT, Unsuited, by_tasks, described, with_cases
+from paper_figures.rows import ALL_TASKS, DEFAULT, Unsuited, by_tasks, described, with_cases
 from paper_figures.style import (
     DEMONSTRATION,
     EDGE,
@@ -52,10 +52,10 @@ EACH = "truth"
 PAPER = 5  # demonstrations of the paper's figure
 
 _BEST = 2  # hypotheses that are outlined
-# The demonstrations that are shown, with the lean of the hatching of what they violate.
-_SHOWN = ((DEMONSTRATION, "\\\\\\\\\\"), (SAMPLED, "/////"))
+# Colour of the first and the second demonstration, and the hatching of what they violate.
+_PAIR = ((DEMONSTRATION, "\\\\\\\\\\"), (SAMPLED, "/////"))
 _CURVES = {1: "the best", 2: "both of the best two"}
-_LISTED = (1, 3, 5, 10, 20)  # demonstrations in the caption's facts
+_COUNTS = (1, 3, 5, 10, 20)  # demonstrations in the caption's facts
 
 
 def draw(
@@ -145,7 +145,7 @@ def facts(
                 f"{row.posterior:.3g}, {where} the truth"
             )
         curve = _of_tasks(curves, words)
-        for row in curve[curve["demonstrations"].isin(_LISTED)].to_dict("records"):
+        for row in curve[curve["demonstrations"].isin(_COUNTS)].to_dict("records"):
             shares = ", ".join(
                 f"{_CURVES[top]} {name} "
                 + "{:.0f} % ({:.0f} to {:.0f})".format(
@@ -155,8 +155,8 @@ def facts(
                 for top in _CURVES
             )
             several = "s" * (row["demonstrations"] > 1)
-            shown = f"{row['demonstrations']} demonstration{several}, {row['seeds']} seeds"
-            lines.append(f"  {shown}: {shares}")
+            sets = f"{row['demonstrations']} demonstration{several}, {row['seeds']} seeds"
+            lines.append(f"  {sets}: {shares}")
     return "\n".join(lines)
 
 
@@ -190,8 +190,8 @@ def _draw_plane(
     for box in plane.regions(regions):
         box.set(facecolor=TRUTH, alpha=0.75, linewidth=0, zorder=2)
         axes.add_patch(box)
-    shown = sorted(paths["demonstration"].unique())[: len(_SHOWN)]
-    for trial, (colour, hatch) in zip(shown, _SHOWN, strict=False):
+    trials = sorted(paths["demonstration"].unique())[: len(_PAIR)]
+    for trial, (colour, hatch) in zip(trials, _PAIR, strict=False):
         path = plane.line(paths[paths["demonstration"] == trial])
         boxes = violations[violations["trial"] == trial]
         style = {"facecolor": "none", "edgecolor": colour, "linewidth": 0}
@@ -211,13 +211,13 @@ def _draw_share(axes: Axes, curve: pd.DataFrame, name: str, place: int) -> None:
     middle, low, high = (100 * curve[name + end] for end in _ENDS)
     axes.fill_between(curve["demonstrations"], low, high, color=colour, alpha=0.2, linewidth=0)
     axes.plot(curve["demonstrations"], middle, color=colour, marker=mark, markevery=(place, 2))
-    ticks = [count for count in _LISTED if count <= curve["demonstrations"].max()]
+    ticks = [count for count in _COUNTS if count <= curve["demonstrations"].max()]
     axes.set_xticks(ticks)
 
 
 def _entries() -> Iterator[object]:
     """What the signs mean."""
-    for (colour, hatch), words in zip(_SHOWN, ("first", "second"), strict=True):
+    for (colour, hatch), words in zip(_PAIR, ("first", "second"), strict=True):
         yield Line2D([], [], color=colour, linewidth=1.4, label=f"{words} demonstration")
         patch = {"facecolor": "white", "edgecolor": colour, "linewidth": 0.3}
         yield Patch(hatch=hatch, label="it violates", **patch)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from paper_figures.curves import draw_dots
-from paper_figures.selection import DEFAULT, Unsuited, by_tasks, with_cases
+from paper_figures.rows import DEFAULT, Unsuited, by_tasks, with_cases
 from paper_figures.style import (
     GUIDE,
     OTHER_COLOURS,
@@ -56,7 +56,7 @@ def draw(
             the truth.
         rank_curve: shares of random sets of demonstrations, a row a number of them.
     """
-    table = _rows(first_ranking, cases, measures, rank_curve)
+    table = _shares(first_ranking, cases, measures, rank_curve)
     names = list(table["case"].drop_duplicates())
     columns = [(name, count) for name in _SHARES for count in _counts(table)]
     figure, grid = new_figure(
@@ -69,9 +69,9 @@ def draw(
         for number, (axes, (name, count)) in enumerate(zip(grid, columns, strict=False)):
             kinds = list(by_tasks(table))
             for place, (words, rows) in enumerate(kinds):
-                own = rows[rows["demonstrations"] == count]
-                y = own["case"].map(names.index) + _SPREAD * (place - (len(kinds) - 1) / 2)
-                shares = 100 * own[[f"{name}{end}" for end in _ENDS]]
+                after = rows[rows["demonstrations"] == count]
+                y = after["case"].map(names.index) + _SPREAD * (place - (len(kinds) - 1) / 2)
+                shares = 100 * after[[f"{name}{end}" for end in _ENDS]]
                 draw_dots(axes, shares, y, _style(words))
             for line in range(1, len(names)):
                 axes.axhline(line - 0.5, color=VIOLATED, linewidth=0.6, zorder=0)
@@ -97,7 +97,7 @@ def facts(
     rank_curve: pd.DataFrame,
 ) -> str:
     """What the caption says."""
-    table = _rows(first_ranking, cases, measures, rank_curve)
+    table = _shares(first_ranking, cases, measures, rank_curve)
     lines = [
         "Share of random sets of demonstrations after which both of the best two hypotheses "
         "overlap the true constraint, or lie inside it, when one choice is changed.",
@@ -121,13 +121,13 @@ def facts(
     return "\n".join(lines)
 
 
-def _rows(
+def _shares(
     first_ranking: pd.DataFrame,
     cases: pd.DataFrame,
     measures: pd.DataFrame,
     rank_curve: pd.DataFrame,
 ) -> pd.DataFrame:
-    """The rows of `rank_curve` with their case and the evidence of a set of demonstrations.
+    """The shares in `rank_curve` with their case and the evidence of a set of demonstrations.
 
     Raises:
         Unsuited: the truth is made of whole hypotheses, so that to overlap it is to lie inside.
@@ -142,8 +142,8 @@ def _rows(
 
 def _counts(table: pd.DataFrame) -> list[int]:
     """The numbers of demonstrations of the columns, or the largest that there is."""
-    there = set(table["demonstrations"])
-    return [count for count in _AT if count in there] or [max(there)]
+    counts = set(table["demonstrations"])
+    return [count for count in _AT if count in counts] or [max(counts)]
 
 
 def _style(words: str) -> dict[str, str]:
@@ -157,16 +157,16 @@ def _draw_evidence(axes: Axes, table: pd.DataFrame) -> None:
     for words, rows in by_tasks(table):
         style = _style(words)
         for case, curve in rows.groupby("case", sort=False):
-            usual = case == DEFAULT
+            is_default = case == DEFAULT
             axes.plot(
                 curve["evidence"],
                 100 * curve["top_2_overlap"],
-                linewidth=1.1 if usual else 0.4,
-                alpha=1 if usual else 0.45,
-                markersize=3 if usual else 2,
-                markerfacecolor=style["color"] if usual else "white",
+                linewidth=1.1 if is_default else 0.4,
+                alpha=1 if is_default else 0.45,
+                markersize=3 if is_default else 2,
+                markerfacecolor=style["color"] if is_default else "white",
                 markeredgewidth=0.5,
-                zorder=3 if usual else 2,
+                zorder=3 if is_default else 2,
                 **style,
             )
     axes.axhline(100, color=GUIDE, linewidth=0.4, zorder=0)

@@ -26,7 +26,7 @@ from matplotlib.figure import Figure
 from experiments.config.paths import CHECKOUT
 from paper_figures import calibration_diagram as calibration
 from paper_figures import in_cell, sensitivity, success, success_cases
-from paper_figures.selection import Unsuited
+from paper_figures.rows import Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, DEMONSTRATION, SAMPLED, STEP_MARKS, TRUTH
 
 MEAN = ["mean", "low", "high"]

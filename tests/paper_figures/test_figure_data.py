@@ -28,7 +28,7 @@ from paper_figures import (
     trajectories,
     violation_distance,
 )
-from paper_figures.selection import Unsuited
+from paper_figures.rows import Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, DEMONSTRATION, GOAL, SAMPLED, START, TRUTH
 
 PAPER = CHECKOUT / "results" / "paper" / "tables"

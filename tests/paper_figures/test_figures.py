@@ -24,7 +24,7 @@ from PIL import Image
 from paper_figures import final_state_error, hypothesis_map, rank_curve, state_space
 from paper_figures.drawing import FIGURES, draw_study
 from paper_figures.figure_notes import SHARED, concerns
-from paper_figures.selection import Unsuited
+from paper_figures.rows import Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, COLUMN, PAGE, TRUTH, save
 
 # Figures of other studies than the paper's.

@@ -1,4 +1,4 @@
-"""Which rows of a study's tables a figure shows, where it cannot show all."""
+"""Which rows of a study's tables figures and report show, where they cannot show all."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pandas as pd
 
 # What the paper's figures show, where a study holds it; the nearest that it holds otherwise.
 ACTIONS, SAMPLES = 9, 1
+PAPER = 9  # demonstrations after which the paper finds the truth among the first
 
 DEFAULT = "default"  # the case of a study with which its others are compared
 
@@ -38,10 +39,10 @@ def paper_rows(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
     """
     if (count := table["truth"].nunique()) > _MOST_TRUTHS:
         raise Unsuited(f"{count} truths are more than {_MOST_TRUTHS} panels")
-    chosen = nearest(nearest(table, "actions", ACTIONS), "samples", SAMPLES)
-    if chosen.duplicated(list(keys)).any():
+    rows = nearest(nearest(table, "actions", ACTIONS), "samples", SAMPLES)
+    if rows.duplicated(list(keys)).any():
         raise Unsuited(f"rows differ in more than {', '.join(keys)}")
-    return chosen.sort_values(list(keys), kind="stable")
+    return rows.sort_values(list(keys), kind="stable")
 
 
 def described(rows: pd.DataFrame, step: str = "dt") -> str:

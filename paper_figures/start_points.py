@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from paper_figures.selection import Unsuited
+from paper_figures.rows import PAPER, Unsuited
 from paper_figures.style import CELL_COLOURS, GUIDE, PAGE, RC, new_figure
 
 _KEYS = ("truth", "cells", "samples", "dt")
@@ -15,7 +15,6 @@ TABLES = {
     "measures": (*_KEYS, "measure", "mean", "low", "high"),
     "rank_curve": (*_KEYS, "demonstrations", "median", "median_low", "median_high", "share_top_5"),
 }
-PAPER = 9  # demonstrations after which the paper finds the truth among the first
 
 _MEASURES = {
     "reachable": ("reachable goals [%]", 100),
@@ -28,7 +27,7 @@ _SHIFT = 0.02  # of a time step, between the marks of different settings
 
 def draw(measures: pd.DataFrame, rank_curve: pd.DataFrame) -> Figure:
     """Draw a row of panels a truth, against the time step; a curve a setting of the cells."""
-    table = _rows(measures, rank_curve)
+    table = _joined(measures, rank_curve)
     truths, settings = sorted(table["truth"].unique()), _settings(table)
     ticks = _apart(sorted(table["dt"].unique()))
     panels = {**_MEASURES, "median": ("rank of truth", 1), "top": ("in top 5 [%]", 100)}
@@ -78,7 +77,7 @@ def draw(measures: pd.DataFrame, rank_curve: pd.DataFrame) -> Figure:
 
 def facts(measures: pd.DataFrame, rank_curve: pd.DataFrame) -> str:
     """What the caption says."""
-    table = _rows(measures, rank_curve)
+    table = _joined(measures, rank_curve)
     after = min(PAPER, rank_curve["demonstrations"].max())
     lines = [
         "Start points of a cell's moves along each dimension: 1 is the paper's, the centre.",
@@ -97,7 +96,7 @@ def facts(measures: pd.DataFrame, rank_curve: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
-def _rows(measures: pd.DataFrame, rank_curve: pd.DataFrame) -> pd.DataFrame:
+def _joined(measures: pd.DataFrame, rank_curve: pd.DataFrame) -> pd.DataFrame:
     """A row a truth, setting and time step, with each number and the ends of its interval."""
     if measures["samples"].nunique() < 2:
         raise Unsuited("all points have the same number of start points in a cell")
@@ -120,11 +119,11 @@ def _settings(table: pd.DataFrame) -> list[tuple[int, int]]:
 
 def _apart(values: list[float]) -> list[float]:
     """Those of ascending values that are far enough apart for labels on a logarithmic axis."""
-    chosen = values[:1]
+    ticks = values[:1]
     for value in values:
-        if value > 1.5 * chosen[-1]:
-            chosen.append(value)
-    return chosen
+        if value > 1.5 * ticks[-1]:
+            ticks.append(value)
+    return ticks
 
 
 def _label(cells: int, samples: int) -> str:

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from paper_figures.plane import Plane, outline
-from paper_figures.selection import Unsuited
+from paper_figures.rows import Unsuited
 from paper_figures.style import (
     DEMONSTRATION,
     EDGE,
@@ -114,12 +114,12 @@ def facts(
         of_panel = (compared_violations["truth"] == truth) & (compared_violations["cells"] == cells)
         by_source = compared_violations[of_panel].groupby("source")["hypothesis"]
         sets = {source: set(hypotheses) for source, hypotheses in by_source}
-        shown, sampled = (sets.get(source, set()) for source in _HATCHES)
+        observed, sampled = (sets.get(source, set()) for source in _HATCHES)
         lines.append(
             f"{truth.upper()}, {cells} cells, {first['actions']} actions, dt {first['dt']:g} s, "
             f"trial {first['trial']}: {visits['cell'].nunique()} cells visited; hypotheses "
-            f"violated by the demonstration {len(shown)}, by the trajectory {len(sampled)}, by "
-            f"both {len(shown & sampled)} (point {first['point']})."
+            f"violated by the demonstration {len(observed)}, by the trajectory {len(sampled)}, by "
+            f"both {len(observed & sampled)} (point {first['point']})."
         )
     return "\n".join(lines)
 

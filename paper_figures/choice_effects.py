@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from paper_figures.curves import draw_dots
-from paper_figures.selection import DEFAULT, Unsuited
+from paper_figures.rows import DEFAULT, PAPER, Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, GUIDE, PAGE, RC, VIOLATED, new_figure
 
 _KEYS = ("truth", "cells", "actions", "dt", "samples")
@@ -18,7 +18,6 @@ TABLES = {
     "rank_curve": (*_KEYS, "demonstrations", "median", "median_low", "median_high"),
 }
 EACH = "truth"
-PAPER = 9  # demonstrations after which the paper finds the truth among the first
 
 _TOP = "share_top_5"
 # Column, title, factor, and the limits of its axis.
@@ -37,7 +36,9 @@ _UNITS = {
 _SPREAD = 0.7  # of a row's height that its marks take
 
 
-def rows(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame) -> pd.DataFrame:
+def case_rows(
+    cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame
+) -> pd.DataFrame:
     """The main numbers of each case at each setting, with their 95 % intervals.
 
     Args:
@@ -75,7 +76,7 @@ def rows(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame) 
 
 def draw(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame) -> Figure:
     """Draw a line a case and a panel a number; marks tell the cells and the time step."""
-    table = rows(cases, measures, rank_curve)
+    table = case_rows(cases, measures, rank_curve)
     names = list(table["case"].drop_duplicates())
     series = _series(table)
     figure, grid = new_figure(PAGE, 0.8 + 0.24 * len(names), ncols=len(_PANELS), sharey=True)
@@ -85,9 +86,9 @@ def draw(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame) 
                 shift = _SPREAD * ((number + 0.5) / len(series) - 0.5)
                 y = of_series["case"].map(names.index) + shift
                 draw_dots(axes, factor * of_series[_limits(name)], y, {**style, "label": label})
-                usual = of_series[of_series["case"] == DEFAULT]
-                if len(usual):
-                    x = factor * float(usual[name].iloc[0])
+                default = of_series[of_series["case"] == DEFAULT]
+                if len(default):
+                    x = factor * float(default[name].iloc[0])
                     axes.axvline(x, color=style["color"], linewidth=0.5, linestyle=":", zorder=0)
             for line in range(1, len(names)):
                 axes.axhline(line - 0.5, color=VIOLATED, linewidth=0.6, zorder=0)
@@ -107,7 +108,7 @@ def draw(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame) 
 
 def facts(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame) -> str:
     """What the caption says."""
-    table = rows(cases, measures, rank_curve)
+    table = case_rows(cases, measures, rank_curve)
     after = min(PAPER, rank_curve["demonstrations"].max())
     first = table.iloc[0]
     lines = [
@@ -134,16 +135,16 @@ def _limits(name: str) -> list[str]:
 
 def _series(table: pd.DataFrame) -> list[tuple[str, dict[str, str], pd.DataFrame]]:
     """The settings of the default case: a label, a mark, and all rows at or nearest to it."""
-    usual = table[table["case"] == DEFAULT].sort_values(["dt", "cells"])
-    found = []
-    for number, row in enumerate(usual.itertuples()):
+    default = table[table["case"] == DEFAULT].sort_values(["dt", "cells"])
+    series = []
+    for number, row in enumerate(default.itertuples()):
         near = table[table["dt"] == row.dt]
         gaps = near.assign(gap=(near["cells"] / row.cells).where(near["cells"] >= row.cells))
-        chosen = gaps[gaps["gap"] < 1.5].drop(columns="gap")
-        repeated = (usual["cells"] == row.cells).idxmax() != row.Index
+        members = gaps[gaps["gap"] < 1.5].drop(columns="gap")
+        repeated = (default["cells"] == row.cells).idxmax() != row.Index
         style = {
             "color": "black" if repeated else CELL_COLOURS.get(row.cells, GUIDE),
             "marker": "D" if repeated else CELL_MARKS.get(row.cells, "Pv*"[number % 3]),
         }
-        found.append((f"{row.cells} cells, $\\Delta t$ = {row.dt:g} s", style, chosen))
-    return found
+        series.append((f"{row.cells} cells, $\\Delta t$ = {row.dt:g} s", style, members))
+    return series
