@@ -1,7 +1,7 @@
-"""Write the report: python -m paper_report [--results DIR]
+"""Write the report: python -m paper_figures.report [--results DIR]
 
 It reads tables and figures only, and writes REPORT.md and REPORT.html into the folder of the study
-`paper`. In a checkout it also renews the numbers in README.md.
+`paper`.
 """
 
 from __future__ import annotations
@@ -16,43 +16,42 @@ import argparse
 import sys
 from pathlib import Path
 
-from paper_figures.report import page, readme
-from paper_figures.report.report import FOLDER, report
+from experiments.config.paths import default_results
+from experiments.tracking.files import replace_file
+from paper_figures.report import page
+from paper_figures.report.document import FOLDER, report
 from paper_figures.report.study_tables import Results
 
-ROOT = Path(__file__).resolve().parents[1]
+_STOPPED = 130  # the exit status after Ctrl-C
 
 
 def main() -> int:
     """Run the command line; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="paper_report", description=__doc__)
+    parser = argparse.ArgumentParser(prog="paper_figures.report", description=__doc__)
     parser.add_argument("--results", type=Path, help="folder of results", metavar="DIR")
-    chosen = parser.parse_args()
-    checkout = (ROOT / "conf" / "config.yaml").is_file()
-    folder = (chosen.results or (ROOT if checkout else Path.cwd()) / "results").resolve()
-    results = Results(folder)
+    options = parser.parse_args()
+    results = Results((options.results or default_results()).resolve())
     if not results.studies():
-        raise SystemExit(f"no study in {folder}: run one first, python experiments/run.py -m ...")
+        raise SystemExit(
+            f"no study in {results.folder}: run one first, python experiments/run.py -m ..."
+        )
     for path in write(results):
         print(f"written: {path}")
-    if chosen.results is None and checkout:
-        path = ROOT / "README.md"
-        text = path.read_text()
-        path.write_text(readme.renewed(text, results))
-        print(f"numbers renewed: {path}")
     return 0
 
 
 def write(results: Results) -> list[Path]:
     """Write REPORT.md and REPORT.html; returns their paths."""
-    folder = results.folder / FOLDER
-    folder.mkdir(exist_ok=True)
-    text = report(results)
-    paths = [folder / "REPORT.md", folder / "REPORT.html"]
-    for path, content in zip(paths, (text, page.html(text, folder)), strict=True):
-        path.write_text(content)
-    return paths
+    folder, text = results.folder / FOLDER, report(results)
+    contents = {folder / "REPORT.md": text, folder / "REPORT.html": page.html(text, folder)}
+    for path, content in contents.items():
+        replace_file(path, content.encode())
+    return list(contents)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # files are finished or removed
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        os._exit(_STOPPED)

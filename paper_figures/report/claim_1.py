@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pandas as pd
 
-from paper_figures.report import section_choices as sensitivity
 from paper_figures.report.markdown import between, percent, table
 from paper_figures.report.means import share
+from paper_figures.report.section_choices import demonstration_shares
 from paper_figures.report.study_tables import Missing, Results, command
 from paper_figures.report.verdict import Check, Claim, Part
 
@@ -22,15 +22,14 @@ def claim(results: Results) -> Claim:
     attempts = results.table("paper", "attempts", ("truth", "seed", "outcome"))
     checks, rows = [], []
     outcomes = ["kept", *sorted(set(attempts["outcome"]) - {"kept"})]
-    for truth, tried in attempts.groupby("truth"):
-        found = share(int((tried["outcome"] == "kept").sum()), len(tried))
-        text = between(percent(found.value), percent(found.low), percent(found.high))
-        checks.append(Check(str(truth).upper(), found.low <= PAPER <= found.high, text))
-        kept = tried[tried["outcome"] == "kept"].groupby("seed").size()
-        counts = [int((tried["outcome"] == outcome).sum()) for outcome in outcomes]
-        seeds = tried["seed"].nunique()
-        row = [str(truth).upper(), seeds, len(tried), *counts, text]
-        rows.append([*row, f"{kept.min()} to {kept.max()}"])
+    for truth, pairs in attempts.groupby("truth"):
+        counts = [int((pairs["outcome"] == outcome).sum()) for outcome in outcomes]
+        part = share(counts[0], len(pairs))
+        text = between(percent(part.value), percent(part.low), percent(part.high))
+        checks.append(Check(str(truth).upper(), part.low <= PAPER <= part.high, text))
+        by_seed = pairs[pairs["outcome"] == "kept"].groupby("seed").size()
+        row = [str(truth).upper(), pairs["seed"].nunique(), len(pairs), *counts, text]
+        rows.append([*row, f"{by_seed.min()} to {by_seed.max()}"])
     words = [outcome.replace("_", " ") for outcome in outcomes]
     head = ["truth", "seeds", "pairs", *words, "share kept", "kept a seed"]
     return Claim(
@@ -53,13 +52,12 @@ def claim(results: Results) -> Claim:
 
 def _why(results: Results, attempts: pd.DataFrame) -> str:
     """What else than the optimiser could explain the difference, as far as it was tried."""
-    lost = attempts[attempts["outcome"] != "kept"]
-    if lost.empty:
+    losses = attempts[attempts["outcome"] != "kept"]["outcome"].value_counts()
+    if losses.empty:
         return ""
-    most = lost["outcome"].value_counts()
     text = (
-        f"Of the {len(lost)} pairs that are lost, {most.iloc[0]} are "
-        f"`{most.index[0].replace('_', ' ')}`."
+        f"Of the {losses.sum()} pairs that are lost, {losses.iloc[0]} are "
+        f"`{losses.index[0].replace('_', ' ')}`."
     )
     peaks = attempts[attempts["outcome"] == "kept"]["peak_control"]
     text += (
@@ -68,7 +66,7 @@ def _why(results: Results, attempts: pd.DataFrame) -> str:
         " tabular agent."
     )
     try:
-        tried = sensitivity.kept(results)
+        shares = demonstration_shares(results)
     except Missing:
         return text + "\n"
-    return f"{text} Share kept when one choice that the paper leaves open is changed:\n\n{tried}"
+    return f"{text} Share kept when one choice that the paper leaves open is changed:\n\n{shares}"

@@ -80,12 +80,12 @@ def _near(distance: Means, truth: str, cells: int, dt: float) -> Check:
 def _flat(distance: Means, truth: str, cells: int) -> Check:
     """Whether the time step hardly matters."""
     values = [distance[truth, cells, dt].value for dt in distance.steps]
-    known = [value for value in values if not math.isnan(value)]
-    mean = sum(known) / len(known) if known else math.nan
-    off = max((abs(value / mean - 1) for value in known), default=math.nan)
-    unknown = len(values) - len(known)
+    numbers = [value for value in values if not math.isnan(value)]
+    mean = sum(numbers) / len(numbers) if numbers else math.nan
+    off = max((abs(value / mean - 1) for value in numbers), default=math.nan)
+    gaps = len(values) - len(numbers)
     return Check(
         f"{truth.upper()}, {cells} cells",
-        off <= LITTLE and not unknown,
-        f"up to {off:.0%}" + (f", no value at {unknown} dt" if unknown else ""),
+        off <= LITTLE and not gaps,
+        f"up to {off:.0%}" + (f", no value at {gaps} dt" if gaps else ""),
     )

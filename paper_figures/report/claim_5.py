@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import pandas as pd
 
 from paper_figures.report.markdown import count, percent, table
-from paper_figures.report.study_tables import ACTIONS, SAMPLES, Missing, Results, command
+from paper_figures.report.study_tables import Missing, Results, command
 from paper_figures.report.verdict import Check, Claim, Part
+from paper_figures.rows import ACTIONS, SAMPLES
 
 SEED = 0  # the one that all numbers of actions have
 KEYS = ["truth", "cells", "dt"]
@@ -104,14 +105,14 @@ def _changes(changes: list[tuple[Measure, pd.DataFrame]], others: list[int]) -> 
     lines = []
     for measure, pairs in changes:
         for actions in others:
-            own = pairs[pairs["actions"] == actions].dropna(subset="change")
-            size = own["change"].abs()
+            values = pairs[pairs["actions"] == actions].dropna(subset="change")
+            size = values["change"].abs()
             where = median = largest = "-"
-            if len(own):
-                worst = own.loc[size.idxmax()]
+            if len(values):
+                worst = values.loc[size.idxmax()]
                 where = f"{worst['truth'].upper()}, {worst['cells']} cells, dt {worst['dt']:g} s"
                 median, largest = measure.spell(size.median()), measure.spell(size.max())
-            lines.append([measure.words, actions, where, len(own), median, largest])
+            lines.append([measure.words, actions, where, len(values), median, largest])
     return (
         f"Change from {ACTIONS} actions, over truths, grids and dt, on the same demonstrations "
         f"(seed {SEED}); of error and distance relative, of shares in points of a hundred.\n\n"
@@ -127,12 +128,12 @@ def _where(changes: list[tuple[Measure, pd.DataFrame]], others: list[int]) -> st
     """In how many settings the difference is little, by dt: too few actions for a long hold?"""
     both = pd.concat([pairs for _, pairs in changes]).dropna(subset="change")
     steps = sorted(both["dt"].unique())
-    held = both.groupby(["actions", "dt"])["holds"].agg(["sum", "size"])
+    counts = both.groupby(["actions", "dt"])["holds"].agg(["sum", "size"])
     rows = [
         [
             f"{actions} actions",
             *(
-                f"{held.loc[(actions, dt), 'sum']} of {held.loc[(actions, dt), 'size']}"
+                f"{counts.loc[(actions, dt), 'sum']} of {counts.loc[(actions, dt), 'size']}"
                 for dt in steps
             ),
         ]

@@ -7,6 +7,7 @@ import pandas as pd
 from paper_figures.report.markdown import between, count, number, percent, table
 from paper_figures.report.study_tables import Missing, Results, command
 from paper_figures.report.verdict import Check, Claim, Part
+from paper_figures.rows import DEFAULT
 
 PAPER = 5  # demonstrations
 HALF = 0.5
@@ -20,7 +21,6 @@ SHARES = {
     "top_2_inside": "both of the best two do",
 }
 SIZES = (1, 3, 5, 10, 20)  # demonstrations that are listed
-DEFAULT = "default"  # the case that the others are compared with
 CROSSING = "tasks.crossing"
 EVIDENCE = "truth_probability"
 WORDS = {False: "random tasks", True: "tasks that cross the truth"}
@@ -36,8 +36,8 @@ def claim(results: Results) -> Claim:
     after = rows[rows["demonstrations"] == PAPER]
     if after.empty:
         raise Missing(STUDY, f"the study `{STUDY}` ranks nothing after {PAPER} demonstrations")
-    listed = results.listing(STUDY)
-    minutes = listed["seconds"] / len(listed["points"]) / 60
+    listing = results.listing(STUDY)
+    minutes = listing["seconds"] / len(listing["points"]) / 60
     return Claim(
         title="Telescoping inverted pendulum",
         paper="with 2500 states, 15 actions and 100 hypotheses over angle and length, the two most "
@@ -50,14 +50,14 @@ def claim(results: Results) -> Claim:
                     f"the low end of the share of random sets that do is at least {HALF:.0%}",
                     [
                         Check(str(row["case"]), bool(row[f"{name}_low"] >= HALF), _share(row, name))
-                        for row in own.to_dict("records")
+                        for row in cases.to_dict("records")
                     ],
                 )
                 for name, what in (
                     ("top_2_overlap", "overlap the truth"),
                     ("top_2_inside", "lie inside the truth"),
                 )
-                for tasks, own in after.groupby("tasks", sort=False)
+                for tasks, cases in after.groupby("tasks", sort=False)
             ),
             Part(
                 f"about {MINUTES} minutes on one core",
@@ -87,18 +87,8 @@ def _rows(results: Results) -> pd.DataFrame:
     )
 
 
-def success(results: Results) -> str:
-    """How often the best hypotheses meet the truth by default, by kind of tasks.
-
-    Raises:
-        Missing: the study `telescope` is not there yet.
-    """
-    rows = _rows(results)
-    return _success(rows[rows["demonstrations"] == PAPER])
-
-
 def _success(rows: pd.DataFrame) -> str:
-    """A line for each row of the default case."""
+    """How often the best hypotheses meet the truth, a line for each row of the default case."""
     return table(
         ["tasks", "demonstrations", "median rank", *SHARES.values()],
         [
@@ -115,21 +105,20 @@ def _success(rows: pd.DataFrame) -> str:
 
 def _numbers(rows: pd.DataFrame) -> str:
     """How often the best hypotheses meet the truth, by number of demonstrations and by case."""
-    sizes = (PAPER, 2 * PAPER)
+    sizes = [size for size in (PAPER, 2 * PAPER) if size in set(rows["demonstrations"])]
     cases = []
-    for (case, tasks), own in rows.groupby(["case", "tasks"], sort=False):
-        shown = own.set_index("demonstrations")
-        at = [shown.loc[size] for size in sizes if size in shown.index]
+    for (case, tasks), curve in rows.groupby(["case", "tasks"], sort=False):
+        by_size = curve.set_index("demonstrations")
+        at = [by_size.loc[size] for size in sizes if size in by_size.index]
         cells = [_share(row, name) for name in ("top_2_overlap", "top_2_inside") for row in at]
-        cases.append([case, tasks, number(own[EVIDENCE].iloc[0], 2), *cells])
-    there = [size for size in sizes if size in set(rows["demonstrations"])]
-    head = [f"{what}, {size}" for what in ("overlap", "inside") for size in there]
+        cases.append([case, tasks, number(curve[EVIDENCE].iloc[0], 2), *cells])
+    head = [f"{what}, {size}" for what in ("overlap", "inside") for size in sizes]
     return (
         "Success by default: share of random sets of demonstrations; a tied set counts by its "
         "chance.\n\n"
         + _success(rows[rows["demonstrations"].isin(SIZES)])
         + "\nBoth of the best two, when one choice is changed, after "
-        + " and ".join(str(size) for size in there)
+        + " and ".join(str(size) for size in sizes)
         + " demonstrations. *Evidence* is the mean probability that an agent without constraint, "
         "given the task of a demonstration, would have violated the best hypothesis inside the "
         "truth:\n\n" + table(["case", "tasks", "evidence", *head], cases, words=2)
@@ -138,8 +127,8 @@ def _numbers(rows: pd.DataFrame) -> str:
 
 def _why(rows: pd.DataFrame) -> str:
     """What governs success, as far as it was tried."""
-    usual = rows[rows["case"] == DEFAULT]
-    random, crossing = (usual[usual[CROSSING] == kind] for kind in (False, True))
+    default = rows[rows["case"] == DEFAULT]
+    random, crossing = (default[default[CROSSING] == kind] for kind in (False, True))
     if random.empty or crossing.empty:
         return ""
     most = random.loc[random["demonstrations"].idxmax()]

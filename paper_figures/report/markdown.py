@@ -32,25 +32,25 @@ def between(value: str, low: str, high: str) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], words: int = 1) -> str:
-    """A table whose first columns, as many as told, hold words, and the others numbers."""
+    """A table whose first columns, `words` of them, hold words, and the others numbers."""
     lines = [head, ["---"] * words + ["---:"] * (len(head) - words), *rows]
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
 
 
-def by_dt(rows: pd.DataFrame, show: str) -> str:
+def by_dt(rows: pd.DataFrame, column: str) -> str:
     """A line for each truth and number of cells, a column for each time step.
 
     Args:
-        rows: truth, cells, dt, and `show`, a text for each.
-        show: the column that is shown.
+        rows: truth, cells, dt, and a text for each.
+        column: the name of the text.
     """
     steps = sorted(rows["dt"].unique())
-    found = {(r.truth, r.cells, r.dt): getattr(r, show) for r in rows.itertuples()}
-    lines = sorted({(truth, cells) for truth, cells, _ in found})
+    texts = {(r.truth, r.cells, r.dt): getattr(r, column) for r in rows.itertuples()}
+    lines = sorted({(truth, cells) for truth, cells, _ in texts})
     return table(
         ["truth, cells", *(f"dt {dt:g} s" for dt in steps)],
         [
-            [f"{truth.upper()}, {cells}", *(found.get((truth, cells, dt), "") for dt in steps)]
+            [f"{truth.upper()}, {cells}", *(texts.get((truth, cells, dt), "") for dt in steps)]
             for truth, cells in lines
         ],
     )

@@ -30,7 +30,7 @@ def html(markdown: str, folder: Path) -> str:
         folder: what the paths of its figures are relative to.
     """
     body = MarkdownIt("commonmark", {"html": False}).enable("table").render(markdown)
-    body = re.sub(r'<img src="([^"]+)"', lambda found: _embedded(found[1], folder), body)
+    body = re.sub(r'<img src="([^"]+)"', lambda match: _embedded(match[1], folder), body)
     title = markdown.partition("\n")[0].lstrip("# ")
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'

@@ -27,12 +27,12 @@ def section(results: Results) -> str:
     Raises:
         Missing: the study `calibration` is not there yet.
     """
-    found = results.table(STUDY, "reliability", (*COLUMNS, "high", "weight", "count"))
+    beliefs = results.table(STUDY, "reliability", (*COLUMNS, "high", "weight", "count"))
     lines = []
     for source, words in SOURCES.items():
         for belief, meant in BELIEFS.items():
-            own = found[(found["source"] == source) & (found["belief"] == belief)]
-            for size, bins in own.groupby("demonstrations"):
+            rows = beliefs[(beliefs["source"] == source) & (beliefs["belief"] == belief)]
+            for size, bins in rows.groupby("demonstrations"):
                 lines.append([words, meant, size, *_judged(bins)])
     if not lines:
         raise Missing(STUDY, f"the study `{STUDY}` has no beliefs of a known kind")

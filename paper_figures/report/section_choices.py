@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pandas as pd
 
-from paper_figures.report.claim_4 import PAPER, RULE, TOP, after
+from paper_figures.report.claim_4 import RULE, TOP, after
 from paper_figures.report.markdown import between, number, percent, table
 from paper_figures.report.study_tables import Missing, Results
+from paper_figures.rows import DEFAULT, PAPER
 
 STUDY = "sensitivity"
-DEFAULT = "default"  # the case that the others are compared with
 CELLS, DT = 400, 0.25  # of the rows that are spelt out
-SHOWN = {
+MEASURES = {
     "reachable": "goals that can be reached",
     "final_state_error": "final-state error",
     "violation_distance": "violation distance",
@@ -27,10 +27,9 @@ def section(results: Results) -> str:
     cases = results.table(STUDY, "cases", ("truth", "cells", "dt", "case"))
     keys = [name for name in cases if name not in ("case", "choice", "value")]
     means = results.table(STUDY, "measures", (*keys, "measure", "mean", "low", "high"))
-    means = means[means["measure"].isin(SHOWN)]
+    means = means[means["measure"].isin(MEASURES)]
     ranks = cases.merge(after(results, STUDY), on=keys, validate="one_to_one")
-    usual = ranks[ranks["case"] == DEFAULT]
-    if usual.empty:
+    if DEFAULT not in set(ranks["case"]):
         raise Missing(STUDY, f"the study `{STUDY}` has no case {DEFAULT!r}")
     texts = means.assign(text=[_text(row) for row in means.to_dict("records")])
     wide = texts.pivot(index=keys, columns="measure", values="text").reset_index()
@@ -38,23 +37,23 @@ def section(results: Results) -> str:
     names = list(dict.fromkeys(ranks["case"]))
     lines = []
     for case in names:
-        own = ranks[(ranks["case"] == case) & _usual_grid(ranks)].sort_values("truth")
-        for row in own.to_dict("records"):
+        rows = ranks[(ranks["case"] == case) & _is_spelt_out(ranks)].sort_values("truth")
+        for row in rows.to_dict("records"):
             setting = f"{row['truth'].upper()}, {row['cells']} cells, dt {row['dt']:g}"
-            lines.append([case, setting, *(row[name] for name in SHOWN), row["text"]])
-    found = ranks.groupby("case")["found"].agg(["sum", "size"]).loc[names]
-    verdicts = [[case, f"{row['sum']} of {row['size']}"] for case, row in found.iterrows()]
-    head = ["case", "setting", *SHOWN.values(), f"median rank after {PAPER}; in the top {TOP}"]
+            lines.append([case, setting, *(row[name] for name in MEASURES), row["text"]])
+    counts = ranks.groupby("case")["success"].agg(["sum", "size"]).loc[names]
+    successes = [[case, f"{row['sum']} of {row['size']}"] for case, row in counts.iterrows()]
+    head = ["case", "setting", *MEASURES.values(), f"median rank after {PAPER}; in the top {TOP}"]
     return (
         f"Settings (truth, cells and dt) in which the truth is found, which means {RULE}:\n\n"
-        + table(["case", "found in"], verdicts)
+        + table(["case", "found in"], successes)
         + f"\nAt {CELLS} cells, or little more, and dt {DT:g} s; the tables of `results/{STUDY}` "
         "have the other settings:\n\n" + table(head, lines, words=2)
     )
 
 
-def kept(results: Results) -> str:
-    """How many pairs become demonstrations by default and in each case where others do.
+def demonstration_shares(results: Results) -> str:
+    """Share of pairs that become demonstrations, by default and in each case that differs.
 
     Raises:
         Missing: the study `sensitivity` is not there yet.
@@ -72,8 +71,8 @@ def kept(results: Results) -> str:
     )
 
 
-def _usual_grid(ranks: pd.DataFrame) -> pd.Series:
-    """Whether a row is of the default discretisation."""
+def _is_spelt_out(ranks: pd.DataFrame) -> pd.Series:
+    """Whether a row is of the discretisation that is spelt out."""
     return ranks["cells"].between(CELLS, 1.1 * CELLS) & (ranks["dt"] == DT)
 
 

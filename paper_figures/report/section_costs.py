@@ -11,7 +11,7 @@ STUDY = "benchmark"
 
 
 def section(results: Results) -> str:
-    """Times of the algorithms, and of one task from a thousand states to a million.
+    """Times of the algorithms, of one task from a thousand states to a million, and of points.
 
     Raises:
         Missing: the benchmark has not run yet.
@@ -32,8 +32,8 @@ def section(results: Results) -> str:
                 [
                     row["what"],
                     "" if pd.isna(row["paper"]) else row["paper"],
-                    seconds(row["median_s"]),
-                    seconds(row["floor_s"]),
+                    _seconds(row["median_s"]),
+                    _seconds(row["floor_s"]),
                     "-" if pd.isna(row["ratio"]) else f"{row['ratio']:.3g}",
                 ]
                 for row in times.to_dict("records")
@@ -48,26 +48,24 @@ def section(results: Results) -> str:
                     row["system"],
                     row["states"],
                     row["actions"],
-                    seconds(row["discretise_s"]),
-                    seconds(row["infer_s"]),
+                    _seconds(row["discretise_s"]),
+                    _seconds(row["infer_s"]),
                     f"{row['peak_mb']:.0f} MB",
                 ]
                 for row in sizes.to_dict("records")
             ],
         )
+        + "\nWhat a point of a sweep costs:\n\n"
+        + _points(results)
     )
 
 
-def points(results: Results) -> str:
-    """What a point of a sweep costs beside its own work.
-
-    Raises:
-        Missing: the benchmark has not run yet.
-    """
+def _points(results: Results) -> str:
+    """Times, memory and files of points."""
     times = results.table(STUDY, "benchmark", ("name", "what", "median_s")).set_index("name")
     costs = results.table(STUDY, "costs", ("name", "what", "value", "unit"))
     rows = [
-        [times.loc[name, "what"], seconds(times.loc[name, "median_s"])]
+        [times.loc[name, "what"], _seconds(times.loc[name, "median_s"])]
         for name in ("plan_point", "collate_point", "largest_paper_point")
         if name in times.index
     ]
@@ -75,7 +73,7 @@ def points(results: Results) -> str:
     return table([f"on {times.iloc[0]['cpu']}, one core", "measured"], rows)
 
 
-def seconds(value: float) -> str:
+def _seconds(value: float) -> str:
     """A time in the unit that suits it."""
     if pd.isna(value):
         return "-"

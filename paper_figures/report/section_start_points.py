@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import pandas as pd
 
-from paper_figures.report.claim_4 import PAPER, RULE, TOP, after
+from paper_figures.report.claim_4 import RULE, TOP, after
 from paper_figures.report.markdown import between, number, percent, table
 from paper_figures.report.study_tables import Results
+from paper_figures.rows import PAPER
 
 STUDY = "in_cell"
 CELLS = 100
 KEYS = ["truth", "dt", "samples"]
-SHOWN = {"reachable": percent, "final_state_error": number, "violation_distance": number}
+MEASURES = {"reachable": percent, "final_state_error": number, "violation_distance": number}
 HEAD = (
     "truth, dt, samples",
     "goals that can be reached",
@@ -21,16 +22,12 @@ HEAD = (
 )
 
 
-def sentence(results: Results) -> str:
-    """In how many settings the truth is found, by the number of samples.
-
-    Raises:
-        Missing: the study `in_cell` is not there yet.
-    """
-    ranks = _ranks(results)
-    found = ranks.groupby("samples")["found"].agg(["sum", "size"])
+def _successes(ranks: pd.DataFrame) -> str:
+    """In how many settings the truth is found, by the number of start points."""
+    counts = ranks.groupby("samples")["success"].agg(["sum", "size"])
     words = "; ".join(
-        f"{samples} a dimension: {row['sum']} of {row['size']}" for samples, row in found.iterrows()
+        f"{samples} a dimension: {row['sum']} of {row['size']}"
+        for samples, row in counts.iterrows()
     )
     return (
         f"With {CELLS} cells, moves that start at several points of a cell instead of its centre "
@@ -48,17 +45,20 @@ def section(results: Results) -> str:
     columns = (*KEYS, "cells", "measure", "mean", "low", "high")
     means = results.table(STUDY, "measures", columns)
     means = means[means["cells"] == CELLS]
-    found = {(*(row[key] for key in KEYS), row["measure"]): row for row in means.to_dict("records")}
+    by_setting = {
+        (*(row[key] for key in KEYS), row["measure"]): row for row in means.to_dict("records")
+    }
     rows = []
-    for rank in _ranks(results).to_dict("records"):
+    ranks = _ranks(results)
+    for rank in ranks.to_dict("records"):
         key = tuple(rank[name] for name in KEYS)
         texts = [
-            between(*(spell(found[(*key, name)][end]) for end in ("mean", "low", "high")))
-            for name, spell in SHOWN.items()
+            between(*(spell(by_setting[(*key, name)][end]) for end in ("mean", "low", "high")))
+            for name, spell in MEASURES.items()
         ]
         label = f"{rank['truth'].upper()}, {rank['dt']:g} s, {rank['samples']}"
         rows.append([label, *texts, rank["text"]])
-    return f"{sentence(results)}\n{table(HEAD, rows)}"
+    return f"{_successes(ranks)}\n{table(HEAD, rows)}"
 
 
 def _ranks(results: Results) -> pd.DataFrame:

@@ -10,16 +10,14 @@ from typing import Any
 
 import pandas as pd
 
+from paper_figures.rows import ACTIONS, SAMPLES
+
 # The commands that make what is in the folders of results.
 COMMANDS = {"benchmark": "make benchmark"}
 
-# What the paper's figures show: 9 actions, and moves that start at the cell's centre.
-ACTIONS, SAMPLES = 9, 1
-
-
 # What is read of a study's listing.
-_LISTED = ("points", "sources", "commits", "dirty", "started", "seconds", "peak_memory_mb")
-_LISTED += ("machines", "versions")
+_LISTING = ("points", "sources", "commits", "dirty", "started", "seconds", "peak_memory_mb")
+_LISTING += ("machines", "versions")
 
 
 class Missing(Exception):
@@ -78,7 +76,7 @@ class Results:
         """
         try:
             content = json.loads((self.folder / study / "study.json").read_bytes())["collated"]
-            return {key: content[key] for key in _LISTED}
+            return {key: content[key] for key in _LISTING}
         except (OSError, ValueError, KeyError, TypeError):
             raise Missing(study, f"the study `{study}` does not list what it came from") from None
 
@@ -100,20 +98,3 @@ def absent(missing: Missing) -> str:
 def paper_rows(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of the paper's figures: 9 actions, one start point a cell."""
     return table[(table["actions"] == ACTIONS) & (table["samples"] == SAMPLES)]
-
-
-def settings(table: pd.DataFrame) -> list[str]:
-    """What tells each row of a study-level table from the others, in words.
-
-    Args:
-        table: opening columns up to `samples`, then `measure` or `demonstrations` and values.
-    """
-    names = list(table.columns)
-    opening = [name for name in names[: names.index("samples") + 1] if table[name].nunique() > 1]
-    texts = []
-    for _, row in table.iterrows():
-        parts = [
-            str(row[name]).upper() if name == "truth" else f"{name} {row[name]}" for name in opening
-        ]
-        texts.append(", ".join(parts) or str(row["truth"]).upper())
-    return texts

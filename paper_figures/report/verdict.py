@@ -11,7 +11,7 @@ from enum import StrEnum
 
 from paper_figures.report.markdown import table
 
-LISTED = 8  # settings in which a rule does not hold that are spelt out
+SPELT_OUT = 8  # settings in which a rule does not hold; more are counted
 
 RULES = """\
 A part of a claim is *reproduced* if its rule holds in every setting that it is checked in, *partly*
@@ -24,7 +24,7 @@ this report.
 
 
 class Verdict(StrEnum):
-    """What came of a claim or a part of it."""
+    """Whether a claim, or a part of it, is reproduced."""
 
     REPRODUCED = "reproduced"
     PARTLY = "partly"
@@ -38,12 +38,12 @@ class Check:
     Attributes:
         setting: which.
         holds: whether the rule holds there.
-        found: the numbers, as text.
+        numbers: what the rule was held against, as text.
     """
 
     setting: str
     holds: bool
-    found: str = ""
+    numbers: str = ""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Claim:
         paper: the paper's statement, in our own words.
         parts: what it comes down to.
         numbers: our numbers, as Markdown.
-        why: what was found about parts that do not reproduce, as Markdown.
+        why: what is known about parts that do not reproduce, as Markdown.
         command: what makes the tables behind it.
     """
 
@@ -100,10 +100,10 @@ class Claim:
     @property
     def verdict(self) -> Verdict:
         """By the verdicts on its parts, as in `RULES`."""
-        found = {part.verdict for part in self.parts}
-        if found == {Verdict.REPRODUCED}:
+        verdicts = {part.verdict for part in self.parts}
+        if verdicts == {Verdict.REPRODUCED}:
             return Verdict.REPRODUCED
-        return Verdict.NOT if found == {Verdict.NOT} else Verdict.PARTLY
+        return Verdict.NOT if verdicts == {Verdict.NOT} else Verdict.PARTLY
 
     def markdown(self) -> str:
         """The claim as a section, without its heading."""
@@ -127,12 +127,12 @@ class Claim:
         for part in self.parts:
             failed = [check for check in part.checks if not check.holds]
             if failed and len(part.checks) > 1:
-                lines.append(f'Where "{part.statement}" does not hold: {_listed(failed)}\n')
+                lines.append(f'Where "{part.statement}" does not hold: {_exceptions(failed)}\n')
         return "\n".join([*lines, self.numbers, self.why])
 
 
-def _listed(checks: Sequence[Check]) -> str:
-    """Settings with what was found, as many as can be read."""
-    texts = [f"{check.setting}{f' ({check.found})' if check.found else ''}" for check in checks]
-    more = f"; and {len(texts) - LISTED} more" if len(texts) > LISTED else ""
-    return "; ".join(texts[:LISTED]) + more + "."
+def _exceptions(checks: Sequence[Check]) -> str:
+    """Settings with their numbers, as many as can be read."""
+    texts = [f"{check.setting}{f' ({check.numbers})' if check.numbers else ''}" for check in checks]
+    more = f"; and {len(texts) - SPELT_OUT} more" if len(texts) > SPELT_OUT else ""
+    return "; ".join(texts[:SPELT_OUT]) + more + "."
