@@ -55,6 +55,8 @@ def _job_count(text: str) -> int:
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # joblib stops its workers
     try:
-        sys.exit(main())
+        status = main()
     except KeyboardInterrupt:
-        os._exit(_STOPPED)
+        status = _STOPPED
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # while the interpreter ends
+    sys.exit(status)

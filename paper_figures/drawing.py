@@ -94,15 +94,14 @@ def draw_studies(studies: Sequence[Path], jobs: int = 1) -> Iterator[Drawing]:
     Yields:
         the drawing of each study, in their order, once its figures are written and listed.
     """
-    parallel = Parallel(n_jobs=jobs, return_as="generator", initializer=_die_at_once)
-    parts = parallel(delayed(_draw)(study, name) for study in studies for name in FIGURES)
+    parallel = Parallel(n_jobs=jobs, return_as="generator")
+    usual = signal.signal(signal.SIGINT, signal.SIG_IGN)  # inherited by workers: joblib stops them
+    try:
+        parts = parallel(delayed(_draw)(study, name) for study in studies for name in FIGURES)
+    finally:
+        signal.signal(signal.SIGINT, usual)
     for study in studies:
         yield _listed(study, itertools.islice(parts, len(FIGURES)))
-
-
-def _die_at_once() -> None:
-    """Make Ctrl-C end a worker process without a traceback."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _draw(study: Path, name: str) -> Drawing:

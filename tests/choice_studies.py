@@ -30,7 +30,7 @@ def settings_row(cells: int, dt: float, samples: int = 1, truth: str = "c1") -> 
     return {"truth": truth, "cells": cells, "actions": 9, "dt": dt, "samples": samples}
 
 
-def sensitivity_tables() -> dict[str, pd.DataFrame]:
+def choice_effect_tables() -> dict[str, pd.DataFrame]:
     """Two cases and the default; one of them on 420 cells in place of 400."""
     rows = [
         {"temperature": temperature, **settings_row(cells, dt)}
@@ -50,7 +50,8 @@ def sensitivity_tables() -> dict[str, pd.DataFrame]:
     return {"cases": cases, "measures": measures, "rank_curve": curve}
 
 
-def in_cell_tables() -> dict[str, pd.DataFrame]:
+def start_point_tables() -> dict[str, pd.DataFrame]:
+    """Two truths and time steps; one of the three settings of the cells has several start points."""
     rows = [
         settings_row(cells, dt, samples, truth)
         for truth in ("c1", "c2")
@@ -61,7 +62,7 @@ def in_cell_tables() -> dict[str, pd.DataFrame]:
     return {"measures": measures, "rank_curve": curve}
 
 
-def calibration_tables() -> dict[str, pd.DataFrame]:
+def belief_tables() -> dict[str, pd.DataFrame]:
     """Two numbers of demonstrations; bins of few beliefs, and of what is no probability."""
     rows, rng = [], np.random.default_rng(2)
     for source in ("demonstrator", "model"):
@@ -119,11 +120,11 @@ def first_rows(crossing: bool) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame
             "overlaps_truth": np.isin(np.arange(9), [4, 5, 7, 8]),
         }
     )
-    own = path_rows().query("truth == 'c1'")
+    paths = path_rows().query("truth == 'c1'")
     if crossing:
-        own = own.assign(angle=own["angle"] + 0.7, speed=-own["speed"])
-    third = own[own["demonstration"] == 0].assign(speed=1.7)
-    paths = pd.concat([own, third.assign(demonstration=2)])
+        paths = paths.assign(angle=paths["angle"] + 0.7, speed=-paths["speed"])
+    third = paths[paths["demonstration"] == 0].assign(speed=1.7)
+    paths = pd.concat([paths, third.assign(demonstration=2)])
     # Demonstrations have the numbers of their trials.
     paths = paths.assign(demonstration=paths["demonstration"].map({0: 3, 1: 4, 2: 7}))
     pairs = [(3, 3), (3, 6), (4, 6), (4, 7 + crossing), (7, 3)]
@@ -170,12 +171,12 @@ def success_tables() -> dict[str, pd.DataFrame]:
     }
 
 
-def known_tables() -> dict[str, dict[str, pd.DataFrame]]:
-    """The tables that each figure is drawn from, by its module."""
+def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
+    """The tables that each figure of a choice is drawn from, by its module."""
     return {
-        "sensitivity": sensitivity_tables(),
-        "in_cell": in_cell_tables(),
-        "calibration": calibration_tables(),
+        "choice_effects": choice_effect_tables(),
+        "start_points": start_point_tables(),
+        "calibration_diagram": belief_tables(),
         "success": success_tables(),
         "success_cases": success_tables(),
     }

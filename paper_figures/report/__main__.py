@@ -52,6 +52,8 @@ def write(results: Results) -> list[Path]:
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # files are finished or removed
     try:
-        sys.exit(main())
+        status = main()
     except KeyboardInterrupt:
-        os._exit(_STOPPED)
+        status = _STOPPED
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # while the interpreter ends
+    sys.exit(status)

@@ -18,7 +18,7 @@ COMMANDS = {
     "infer": (["experiments/infer.py", "demonstrations=none"], "hydra"),
     "results": (["experiments/results.py", "status"], "argparse"),
     "figures": (["-m", "paper_figures"], "argparse"),
-    "report": (["-m", "paper_report"], "argparse"),
+    "report": (["-m", "paper_figures.report"], "argparse"),
 }
 
 

@@ -9,7 +9,7 @@ trap 'rm -rf "$work"' EXIT
 # Built from a copy: an old build folder in the checkout would lend the wheel its files.
 mkdir "$work/source" "$work/empty"
 cd "$root"
-cp -r mlci experiments paper_figures paper_report conf pyproject.toml README.md LICENSE "$work/source"
+cp -r mlci experiments paper_figures conf pyproject.toml README.md LICENSE "$work/source"
 "$python" -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir "$work" "$work/source"
 
 "$python" -m venv "$work/venv"

@@ -1,8 +1,9 @@
-"""The report, on tables made up so that its verdicts are known, and on those of this repository."""
+"""The report, on tables made up so that its verdicts are known."""
 
 from __future__ import annotations
 
 import json
+import sys
 from html.parser import HTMLParser
 from itertools import product
 from pathlib import Path
@@ -14,23 +15,24 @@ from scipy import stats
 
 from experiments.config.paths import CHECKOUT
 from paper_figures.report import __main__ as command_line
-from paper_figures.report import claim_1 as kept
-from paper_figures.report import claim_2 as accuracy
-from paper_figures.report import claim_3 as violations
-from paper_figures.report import claim_4 as ranking
-from paper_figures.report import claim_5 as actions
-from paper_figures.report import claim_6 as telescope
-from paper_figures.report import page, readme
-from paper_figures.report import section_beliefs as calibration
-from paper_figures.report import section_choices as sensitivity
-from paper_figures.report import section_costs as timings
-from paper_figures.report import section_start_points as in_cell
+from paper_figures.report import (
+    claim_1,
+    claim_2,
+    claim_3,
+    claim_4,
+    claim_5,
+    claim_6,
+    page,
+    section_beliefs,
+    section_choices,
+    section_costs,
+    section_start_points,
+)
+from paper_figures.report.document import report
 from paper_figures.report.means import Mean, share
-from paper_figures.report.report import report
 from paper_figures.report.study_tables import Missing, Results
 from paper_figures.report.verdict import Check, Claim, Part, Verdict
 
-ROOT = CHECKOUT
 TRUTHS, CELLS, STEPS = ("c1", "c2"), (100, 400, 900, 1600), (0.1, 0.2, 0.25, 0.5, 1.0)
 SETTINGS = [
     {"truth": truth, "cells": cells, "actions": number, "dt": dt, "samples": 1}
@@ -191,14 +193,14 @@ def test_a_mean_is_lower_only_if_the_intervals_are_apart() -> None:
 
 
 def test_what_the_paper_claims_is_reproduced_by_tables_that_show_it(results: Results) -> None:
-    for write_claim in (kept.claim, accuracy.claim, violations.claim, ranking.claim, actions.claim):
+    for write_claim in (claim_1.claim, claim_2.claim, claim_3.claim, claim_4.claim, claim_5.claim):
         claim = write_claim(results)
         assert claim.verdict is Verdict.REPRODUCED, [(p.statement, p.checks) for p in claim.parts]
 
 
 def test_claim_1_fails_where_other_numbers_of_pairs_are_kept(results: Results) -> None:
     write(results.folder, "paper", attempts=attempt_rows(5))
-    claim = kept.claim(Results(results.folder))
+    claim = claim_1.claim(Results(results.folder))
     assert claim.verdict is Verdict.NOT
     assert "95 % [93, 97 %]" in claim.numbers
     assert "Of the 50 pairs that are lost, 50 are `goal missed`" in claim.why
@@ -212,11 +214,11 @@ def test_claim_2_counts_the_settings_that_do_not_saturate_or_have_no_value(
     fine = changed(
         results, "measures", own & (rows["cells"] == 1600), mean=0.001, low=0, high=0.002
     )
-    assert parts(accuracy.claim(fine)) == [(10, 10), (9, 10), (8, 8)]
+    assert parts(claim_2.claim(fine)) == [(10, 10), (9, 10), (8, 8)]
     none = changed(
         results, "measures", own & (rows["cells"] == 100), mean=None, low=None, high=None
     )
-    claim = accuracy.claim(none)
+    claim = claim_2.claim(none)
     assert parts(claim) == [(9, 10), (9, 10), (8, 8)]
     assert "C1, dt 0.5 (- to " in claim.markdown()
 
@@ -225,25 +227,25 @@ def test_claim_3_counts_each_part_apart(results: Results) -> None:
     rows = results.table("paper", "measures")
     own = (rows["measure"] == "violation_distance") & (rows["truth"] == "c2")
     where = own & (rows["cells"] == 900) & (rows["dt"] == 0.1)
-    found = violations.claim(changed(results, "measures", where, mean=10.0))
+    found = claim_3.claim(changed(results, "measures", where, mean=10.0))
     assert parts(found) == [(10, 10), (19, 20), (5, 6)]
     assert "C2, 900 cells, dt 0.1 (+25%)" in found.markdown()
     where = own & (rows["cells"] == 400) & (rows["dt"] == 0.1)
     lost = changed(results, "measures", where, mean=None, low=None, high=None)
-    assert parts(violations.claim(lost)) == [(9, 10), (18, 20), (5, 6)]
+    assert parts(claim_3.claim(lost)) == [(9, 10), (18, 20), (5, 6)]
 
 
 def test_claim_4_wants_median_and_share(results: Results) -> None:
     rows = results.table("paper", "rank_curve")
     nine = (rows["demonstrations"] == 9) & (rows["actions"] == 9) & (rows["truth"] == "c1")
     where = nine & (rows["cells"] == 900) & (rows["dt"] == 0.5)
-    assert parts(ranking.claim(changed(results, "rank_curve", where, median=5.5)))[3] == (29, 30)
-    claim = ranking.claim(changed(results, "rank_curve", where, median=2, share_top_5_low=0.49))
+    assert parts(claim_4.claim(changed(results, "rank_curve", where, median=5.5)))[3] == (29, 30)
+    claim = claim_4.claim(changed(results, "rank_curve", where, median=2, share_top_5_low=0.49))
     assert parts(claim) == [(8, 8), (2, 2), (2, 2), (29, 30)]
     bad = changed(results, "rank_curve", nine & (rows["cells"] == 100), median=30)
-    assert parts(ranking.claim(bad))[0] == (7, 8)
+    assert parts(claim_4.claim(bad))[0] == (7, 8)
     stay = results.table("paper", "summary")["cells"] == 100
-    claim = ranking.claim(changed(results, "summary", stay, stay=0.2))
+    claim = claim_4.claim(changed(results, "summary", stay, stay=0.2))
     assert parts(claim)[2] == (0, 2)
     assert "| 100, 0.2 s | 20 % | 0 % | 100 % | 260 of 260 |" in claim.why
 
@@ -251,10 +253,10 @@ def test_claim_4_wants_median_and_share(results: Results) -> None:
 def test_claim_5_compares_on_the_same_demonstrations(results: Results) -> None:
     rows = results.table("paper", "summary")
     where = (rows["actions"] == 9) & (rows["seed"] == 1)  # another seed than 5 and 15 actions have
-    same = actions.claim(changed(results, "summary", where, violation_distance=99.0))
+    same = claim_5.claim(changed(results, "summary", where, violation_distance=99.0))
     assert same.verdict is Verdict.REPRODUCED
     where = (rows["actions"] == 5) & (rows["dt"] == 1.0) & (rows["truth"] == "c1")
-    claim = actions.claim(changed(results, "summary", where, violation_distance=16.18))
+    claim = claim_5.claim(changed(results, "summary", where, violation_distance=16.18))
     assert parts(claim) == [(80, 80), (76, 80), (80, 80), (80, 80)]
     assert "5 actions, C1, 400 cells, dt 1 (+100 %)" in claim.markdown()
     assert "| 5 actions | 32 of 32 | 32 of 32 | 32 of 32 | 32 of 32 | 28 of 32 |" in claim.why
@@ -274,7 +276,7 @@ def telescope_tables() -> dict[str, pd.DataFrame]:
             part = 0.8 + 0.005 * size * chance
             shares = {
                 f"{name}{end}": value
-                for name in telescope.SHARES
+                for name in claim_6.SHARES
                 for end, value in (("", part), ("_low", 0.6), ("_high", 0.95))
             }
             curve.append({**row, "demonstrations": size, "median": 1.5, **shares})
@@ -288,7 +290,7 @@ def telescope_tables() -> dict[str, pd.DataFrame]:
 def test_claim_6_wants_both_best_hypotheses_and_the_time(tmp_path: Path) -> None:
     tables = telescope_tables()
     write(tmp_path, "telescope", **tables)
-    claim = telescope.claim(Results(tmp_path))
+    claim = claim_6.claim(Results(tmp_path))
     assert claim.verdict is Verdict.REPRODUCED
     assert [part.statement for part in claim.parts[:2]] == [
         "the best two overlap the truth after 5 demonstrations of random tasks",
@@ -300,7 +302,7 @@ def test_claim_6_wants_both_best_hypotheses_and_the_time(tmp_path: Path) -> None
     curve.loc[where, "top_2_overlap_low"] = 0.4
     curve.loc[where, "top_2_inside_low"] = 0.5
     write(tmp_path, "telescope", **tables)
-    claim = telescope.claim(Results(tmp_path))
+    claim = claim_6.claim(Results(tmp_path))
     assert parts(claim) == [(2, 2), (1, 2), (2, 2), (2, 2), (1, 1)]
     assert claim.verdict is Verdict.PARTLY
     assert "does not hold: start points in a cell: 1 (81 % [40, 95 %])." in claim.markdown()
@@ -309,7 +311,7 @@ def test_claim_6_wants_both_best_hypotheses_and_the_time(tmp_path: Path) -> None
 def test_claim_6_compares_sets_of_equal_evidence(tmp_path: Path) -> None:
     """20 random demonstrations at 0.25 hold as much as 10 others at 0.5."""
     write(tmp_path, "telescope", **telescope_tables())
-    why = telescope.claim(Results(tmp_path)).why
+    why = claim_6.claim(Results(tmp_path)).why
     assert "20 random demonstrations hold as much evidence (5.0) as 10 of tasks that cross" in why
     assert "with the share that overlaps is 1.0, and with the share inside 1.0." in why
     assert "after the former 82 % of the sets overlap and 82 % lie inside, after the latter " in why
@@ -334,16 +336,16 @@ def test_sensitivity_counts_where_the_truth_is_found_in_each_case(results: Resul
     tables = {"cases": cases, "rank_curve": ranks, "measures": means, "summary": summary}
     write(results.folder, "sensitivity", **tables)
     found = Results(results.folder)
-    text = sensitivity.section(found)
+    text = section_choices.section(found)
     # Of two truths, two grids and two dt, 100 cells at dt 0.2 s fail in any case.
     assert "| default | 6 of 8 |" in text
     assert "| temperature: 4 | 3 of 8 |" in text
     assert text.count(", 400 cells, dt 0.25 |") == 4
     assert ", 100 cells" not in text
-    assert "| temperature: 4 | 70 % | 70 % |" in kept.claim(found).why
+    assert "| temperature: 4 | 70 % | 70 % |" in claim_1.claim(found).why
     write(results.folder, "sensitivity", cases=cases[cases["case"] != "default"])
     with pytest.raises(Missing, match="has no case 'default'"):
-        sensitivity.section(Results(results.folder))
+        section_choices.section(Results(results.folder))
 
 
 def test_calibration_counts_bins_that_agree(tmp_path: Path) -> None:
@@ -358,7 +360,7 @@ def test_calibration_counts_bins_that_agree(tmp_path: Path) -> None:
     table = pd.DataFrame(rows, columns=names)
     table = table.assign(source="model", demonstrations=3, belief="selected")
     write(tmp_path, "calibration", reliability=table)
-    text = calibration.section(Results(tmp_path))
+    text = section_beliefs.section(Results(tmp_path))
     # Two thirds of the probabilities at 0.2 and one at 0.8: 0.4; right 1/3; off 0.1 and 0.4: 0.2.
     assert "| 3 | 0.400 | 0.333 | 0.200 | 1 of 2 | 25 % |" in text
     assert "most likely one, exact posterior" in text
@@ -389,12 +391,12 @@ def test_times_are_in_units_that_suit_them(tmp_path: Path) -> None:
     scale = pd.DataFrame([{**size, "peak_mb": 150}])
     write(tmp_path, "benchmark", benchmark=times, costs=costs, scale=scale)
     found = Results(tmp_path)
-    text = timings.section(found)
+    text = section_costs.section(found)
     assert "| collating |  | 2.1 ms | 500 µs | 4.2 |" in text
     assert "| all | 5 min | 12.3 s | - | - |" in text
     assert "| t | 1000 | 15 | 500 ms | 20 µs | 150 MB |" in text
-    assert "| files | 12 inodes |" in timings.points(found)
-    assert "| all | 12.3 s |" in timings.points(found)
+    assert "| files | 12 inodes |" in text
+    assert "| all | 12.3 s |" in text
 
 
 def test_in_cell_sampling_counts_where_the_truth_is_found(results: Results) -> None:
@@ -407,7 +409,7 @@ def test_in_cell_sampling_counts_where_the_truth_is_found(results: Results) -> N
         measures=pd.concat([means, means.assign(samples=3)]),
         rank_curve=pd.concat([curve, better]),
     )
-    text = in_cell.section(Results(results.folder))
+    text = section_start_points.section(Results(results.folder))
     assert "1 a dimension: 8 of 10; 3 a dimension: 10 of 10." in text
     assert "| C1, 0.2 s, 1 | 100 % [100, 100 %] |" in text
 
@@ -421,10 +423,10 @@ def test_what_is_not_there_is_told_with_its_command(results: Results) -> None:
     few = results.table("paper", "measures").query("cells != 900")
     write(results.folder, "paper", measures=few)
     with pytest.raises(Missing, match=r"no point with truth c1, 900 cells and dt 0\.1 s"):
-        accuracy.claim(Results(results.folder))
+        claim_2.claim(Results(results.folder))
     write(results.folder, "paper", measures=few.drop(columns="low"))
     with pytest.raises(Missing, match=r"table `measures` of the study `paper` has no column low"):
-        accuracy.claim(Results(results.folder))
+        claim_2.claim(Results(results.folder))
     (results.folder / "paper" / "study.json").write_text("{")
     assert "## Where the numbers come from\n\nNot there yet" in report(Results(results.folder))
 
@@ -463,35 +465,26 @@ def test_the_page_is_one_file_with_everything_in_it(tmp_path: Path) -> None:
     assert "<title>Title</title>" in content
 
 
-def test_blocks_of_the_readme_are_renewed_and_the_rest_stays(results: Results) -> None:
-    text = "a\n<!-- numbers: ranks -->\nold\n<!-- end of numbers -->\nb\n"
-    first = readme.renewed(text, results)
-    assert first.startswith("a\n<!-- numbers: ranks -->\n| truth, cells |")
-    assert first.endswith("|\n<!-- end of numbers -->\nb\n")
-    assert "old" not in first
-    assert readme.renewed(first, results) == first
-    text = text.replace("ranks", "in_cell")
-    assert "experiment=in_cell` makes it.\n<!-- end" in readme.renewed(text, results)
-    with pytest.raises(ValueError, match="nothing writes the numbers 'rank'; there are verdicts"):
-        readme.renewed(text.replace("in_cell", "rank"), results)
-
-
-def test_the_command_writes_both_files_and_leaves_the_readme_of_others(
+def test_the_command_writes_two_files_and_no_other(
     results: Results, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before = (ROOT / "README.md").read_bytes()
-    monkeypatch.setattr("sys.argv", ["paper_report", "--results", str(results.folder)])
+    def files(folder: Path) -> dict[Path, int]:
+        return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+
+    assert CHECKOUT is not None
+    (results.folder / "results").symlink_to(results.folder)
+    readme, before = CHECKOUT / "README.md", files(results.folder)
+    text = readme.read_bytes()
+    monkeypatch.chdir(results.folder)  # the default is `results` of the current folder
+    monkeypatch.setattr("sys.argv", ["paper_figures.report"])
     assert command_line.main() == 0
-    assert (results.folder / "paper" / "REPORT.md").read_text() == report(results)
-    assert "written: " in capsys.readouterr().out
-    assert (ROOT / "README.md").read_bytes() == before
-    monkeypatch.setattr("sys.argv", ["paper_report", "--results", str(results.folder / "none")])
+    paths = [results.folder / "paper" / name for name in ("REPORT.md", "REPORT.html")]
+    assert paths[0].read_text() == report(results)
+    assert capsys.readouterr().out == "".join(f"written: {path}\n" for path in paths)
+    after = files(results.folder)
+    assert set(after) - set(before) == set(paths)
+    assert {path: after[path] for path in before} == before
+    assert readme.read_bytes() == text
+    monkeypatch.setattr("sys.argv", [*sys.argv, "--results", str(results.folder / "none")])
     with pytest.raises(SystemExit, match=r"no study in .*none: run one first"):
         command_line.main()
-
-
-def test_readme_and_report_are_what_the_tables_of_this_repository_say() -> None:
-    results = Results(ROOT / "results")
-    text = (ROOT / "README.md").read_text()
-    assert readme.renewed(text, results) == text, "make report"
-    assert (ROOT / "results" / "paper" / "REPORT.md").read_text() == report(results), "make report"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -12,10 +13,9 @@ from choice_studies import (
     KINDS,
     LIMITS,
     SUCCESS_CASES,
-    calibration_tables,
-    in_cell_tables,
-    sensitivity_tables,
-    success_tables,
+    belief_tables,
+    choice_effect_tables,
+    start_point_tables,
 )
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection, PolyCollection
@@ -23,11 +23,18 @@ from matplotlib.colors import to_hex
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
-from experiments.config.paths import CHECKOUT
-from paper_figures import calibration_diagram as calibration
-from paper_figures import in_cell, sensitivity, success, success_cases
+from paper_figures import (
+    calibration_diagram,
+    choice_effects,
+    start_points,
+    success,
+    success_cases,
+)
 from paper_figures.rows import Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, DEMONSTRATION, SAMPLED, STEP_MARKS, TRUTH
+
+Drawn = Callable[[ModuleType], Figure]
+TablesFor = Callable[[ModuleType], dict[str, pd.DataFrame]]
 
 MEAN = ["mean", "low", "high"]
 
@@ -46,9 +53,8 @@ def marks_and_ends(container: ErrorbarContainer) -> np.ndarray:
     return np.column_stack([*marks, ends[:, 0, along], ends[:, 1, along]])
 
 
-def test_sensitivity_draws_each_case_with_its_interval() -> None:
-    tables = sensitivity_tables()
-    figure = sensitivity.draw(**tables)
+def test_choice_effects_draw_each_case_with_its_interval(drawn: Drawn) -> None:
+    tables, figure = choice_effect_tables(), drawn(choice_effects)
     rank, top, error, distance = figure.axes
     assert [text.get_text() for text in rank.get_yticklabels()] == [
         "default",
@@ -75,14 +81,14 @@ def test_sensitivity_draws_each_case_with_its_interval() -> None:
                 1,
             ),
         ):
-            drawn = bars(axes, label)
-            drawn = drawn[np.argsort(drawn[:, 1])]
+            dots = bars(axes, label)
+            dots = dots[np.argsort(dots[:, 1])]
             expected = [
                 factor * table.query(key.format(t, c, dt))[columns].to_numpy()[0]
                 for t, c, _ in of_series
             ]
-            np.testing.assert_allclose(drawn[:, [0, 2, 3]], expected)
-            np.testing.assert_array_equal(np.round(drawn[:, 1]), [line for *_, line in of_series])
+            np.testing.assert_allclose(dots[:, [0, 2, 3]], expected)
+            np.testing.assert_array_equal(np.round(dots[:, 1]), [line for *_, line in of_series])
             checked += len(expected)
     assert checked == 4 * 7
     styles = {each.get_label(): each[0] for each in rank.containers}
@@ -91,10 +97,10 @@ def test_sensitivity_draws_each_case_with_its_interval() -> None:
     assert len({line.get_marker() for line in styles.values()}) == 3
 
 
-def test_sensitivity_says_every_number() -> None:
-    tables = sensitivity_tables()
-    lines = sensitivity.facts(**tables).splitlines()
-    row = sensitivity.rows(**tables).iloc[-1]
+def test_choice_effects_say_every_number() -> None:
+    tables = choice_effect_tables()
+    lines = choice_effects.facts(**tables).splitlines()
+    row = choice_effects.case_rows(**tables).iloc[-1]
     assert lines[-1].startswith("  temperature: 2, 400 cells, dt 0.5 s: ")
     for name, factor in (("rank", 1), ("top", 100), ("final_state_error", 1)):
         values = [f"{factor * row[name + end]:.3g}" for end in LIMITS]
@@ -102,18 +108,17 @@ def test_sensitivity_says_every_number() -> None:
     assert len([line for line in lines if line.startswith("  ")]) == len(tables["cases"])
 
 
-def test_sensitivity_needs_a_default_and_one_row_a_case() -> None:
-    tables = sensitivity_tables()
+def test_choice_effects_need_a_default_and_one_row_a_case() -> None:
+    tables = choice_effect_tables()
     other = {**tables, "cases": tables["cases"].assign(case="mine")}
     with pytest.raises(Unsuited, match="rows of one case differ in more than"):
-        sensitivity.draw(**{**other, "cases": other["cases"].assign(case="default")})
+        choice_effects.draw(**{**other, "cases": other["cases"].assign(case="default")})
     with pytest.raises(Unsuited, match="no case is named default"):
-        sensitivity.draw(**other)
+        choice_effects.draw(**other)
 
 
-def test_in_cell_draws_each_setting_with_its_interval() -> None:
-    tables = in_cell_tables()
-    figure = in_cell.draw(**tables)
+def test_start_points_draw_each_setting_with_its_interval(drawn: Drawn) -> None:
+    tables, figure = start_point_tables(), drawn(start_points)
     panels = np.reshape(figure.axes, (2, 5))
     curve = tables["rank_curve"].query("demonstrations == 9")
     measures = tables["measures"]
@@ -129,28 +134,28 @@ def test_in_cell_draws_each_setting_with_its_interval() -> None:
             assert axes.get_title().startswith(truth.upper())
             for cells, samples in ((100, 1), (100, 3), (400, 1)):
                 points = "points" if samples > 1 else "point"
-                drawn = bars(axes, f"{cells} cells, {samples} start {points} a dimension")
-                chosen = table.query(
+                dots = bars(axes, f"{cells} cells, {samples} start {points} a dimension")
+                rows = table.query(
                     f"truth == '{truth}' and cells == {cells} and samples == {samples}"
                 )
-                np.testing.assert_allclose(drawn[:, 1:], factor * chosen[columns].to_numpy())
-                np.testing.assert_allclose(drawn[:, 0], chosen["dt"], rtol=0.05)
-    said = in_cell.facts(**tables).splitlines()
+                np.testing.assert_allclose(dots[:, 1:], factor * rows[columns].to_numpy())
+                np.testing.assert_allclose(dots[:, 0], rows["dt"], rtol=0.05)
+    said = start_points.facts(**tables).splitlines()
     assert len([line for line in said if line.startswith("  C")]) == 12
 
 
-def test_in_cell_needs_several_samples_and_nothing_else() -> None:
-    tables = in_cell_tables()
+def test_start_points_need_several_samples_and_nothing_else() -> None:
+    tables = start_point_tables()
     with pytest.raises(Unsuited, match="the same number of start points"):
-        in_cell.draw(**{name: table.query("samples == 1") for name, table in tables.items()})
+        start_points.draw(**{name: table.query("samples == 1") for name, table in tables.items()})
     twice = {name: pd.concat([table, table]) for name, table in tables.items()}
     with pytest.raises(Unsuited, match="rows differ in more than truth, cells, samples, dt"):
-        in_cell.draw(**twice)
+        start_points.draw(**twice)
 
 
-def test_calibration_draws_what_is_probable_and_of_enough_beliefs() -> None:
-    (table,) = calibration_tables().values()
-    panels = np.reshape(calibration.draw(table).axes, (2, 4))
+def test_calibration_draws_what_is_probable_and_of_enough_beliefs(drawn: Drawn) -> None:
+    (table,) = belief_tables().values()
+    panels = np.reshape(drawn(calibration_diagram).axes, (2, 4))
     for row, source in zip(panels, ("model", "demonstrator"), strict=True):
         for axes, belief in zip(row, ("each", "selected", "corrected", "printed"), strict=True):
             rows = table.query(f"source == '{source}' and belief == '{belief}'")
@@ -162,18 +167,18 @@ def test_calibration_draws_what_is_probable_and_of_enough_beliefs() -> None:
             assert said == ""
             for count, mark in ((1, STEP_MARKS[0]), (10, STEP_MARKS[1])):
                 label = f"{count} demonstration{'s' if count > 1 else ''}"
-                chosen = rows.query(f"demonstrations == {count} and count >= 20")
-                assert len(chosen) == 2
-                drawn = bars(axes, label)
+                bins = rows.query(f"demonstrations == {count} and count >= 20")
+                assert len(bins) == 2
+                dots = bars(axes, label)
                 columns = ["predicted", "observed", "low", "high"]
-                np.testing.assert_allclose(drawn, 100 * chosen[columns].to_numpy())
+                np.testing.assert_allclose(dots, 100 * bins[columns].to_numpy())
                 (line,) = (each[0] for each in axes.containers if each.get_label() == label)
                 assert line.get_marker() == mark
 
 
 def test_calibration_says_what_is_right() -> None:
-    (table,) = calibration_tables().values()
-    lines = calibration.facts(table).splitlines()
+    (table,) = belief_tables().values()
+    lines = calibration_diagram.facts(table).splitlines()
     rows = table.query("source == 'model' and belief == 'selected' and demonstrations == 10")
     means = [np.average(rows[name], weights=rows["weight"]) for name in ("predicted", "observed")]
     assert "  model, selected, 10: {:.3f} probable, {:.3f} right".format(*means) in lines
@@ -182,19 +187,7 @@ def test_calibration_says_what_is_right() -> None:
     said = f"{share:.0%} of them are no probability, of which {right:.3f} right"
     assert f"  model, printed, 1: {said}" in lines
     with pytest.raises(Unsuited, match="rows differ in more than source, demonstrations, belief"):
-        calibration.draw(pd.concat([table, table]))
-
-
-TELESCOPE = CHECKOUT / "results" / "telescope" / "tables"
-STUDIES = ["known", "telescope"] if (TELESCOPE / "first_ranking.csv").is_file() else ["known"]
-
-
-def given(module: ModuleType, study: str = "known") -> dict[str, pd.DataFrame]:
-    """The tables that a figure of success needs: made up, or those of this repository."""
-    if study == "telescope":
-        return {name: pd.read_csv(TELESCOPE / f"{name}.csv") for name in module.TABLES}
-    tables = success_tables()
-    return {name: tables[name] for name in module.TABLES}
+        calibration_diagram.draw(pd.concat([table, table]))
 
 
 def of_default(table: pd.DataFrame, crossing: bool) -> pd.DataFrame:
@@ -230,12 +223,13 @@ def wrapped(path: np.ndarray) -> np.ndarray:
     return np.column_stack([path[:, 0] % (2 * np.pi), path[:, 1]])
 
 
-@pytest.mark.parametrize("study", STUDIES)
-def test_success_curves_are_the_shares_of_the_default_case(study: str) -> None:
-    tables = given(success, study)
+def test_success_curves_are_the_shares_of_the_default_case(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    tables = tables_for(success)
     usual = tables["cases"].query("case == 'default'").merge(tables["rank_curve"])
-    figure = success.draw(**tables)
-    drawn = signs(figure)
+    figure = drawn(success)
+    styles = signs(figure)
     for row, crossing in zip(np.reshape(figure.axes, (2, 3)), KINDS, strict=True):
         rows = usual[usual["tasks.crossing"] == crossing]
         assert rows["demonstrations"].tolist() == list(range(1, 21))
@@ -249,7 +243,7 @@ def test_success_curves_are_the_shares_of_the_default_case(study: str) -> None:
             }
             assert len(bands) == 2
             for top, words in ((1, "the best"), (2, "both of the best two")):
-                sign = drawn[words]
+                sign = styles[words]
                 middle, low, high = (100 * rows[f"top_{top}_{name}{end}"] for end in LIMITS)
                 x, y = lines[sign].get_data()
                 np.testing.assert_array_equal(x, rows["demonstrations"])
@@ -262,9 +256,10 @@ def test_success_curves_are_the_shares_of_the_default_case(study: str) -> None:
             assert paper.get_xdata() == [5, 5]
 
 
-def test_success_shows_the_first_demonstrations_and_the_best() -> None:
-    tables = given(success)
-    figure = success.draw(**tables)
+def test_success_shows_the_first_demonstrations_and_the_best(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    tables, figure = tables_for(success), drawn(success)
     for (axes, *_), (crossing, words) in zip(
         np.reshape(figure.axes, (2, 3)), KINDS.items(), strict=True
     ):
@@ -306,8 +301,8 @@ def test_success_shows_the_first_demonstrations_and_the_best() -> None:
             assert patch.get_bbox().contains(*text.get_position())
 
 
-def test_success_outlines_none_that_gains_nothing() -> None:
-    tables = given(success)
+def test_success_outlines_none_that_gains_nothing(tables_for: TablesFor) -> None:
+    tables = tables_for(success)
     ranking = tables["first_ranking"]
     poor = ranking.assign(gain=ranking["gain"].where(ranking["hypothesis"] == 5, 0.0))
     poor = poor.assign(rank=np.where(poor["hypothesis"] == 5, 1.0, 5.5))
@@ -317,8 +312,8 @@ def test_success_outlines_none_that_gains_nothing() -> None:
     assert [[text.get_text() for text in axes.texts] for axes in planes] == [["1"], []]
 
 
-def test_success_says_the_numbers() -> None:
-    tables = given(success)
+def test_success_says_the_numbers(tables_for: TablesFor) -> None:
+    tables = tables_for(success)
     lines = success.facts(**tables).splitlines()
     best = {False: [(8, "inside"), (5, "across")], True: [(2, "off"), (4, "across")]}
     for crossing, words in KINDS.items():
@@ -343,43 +338,45 @@ def test_success_says_the_numbers() -> None:
                     )
 
 
-@pytest.mark.parametrize("study", STUDIES)
-def test_success_cases_draws_each_case_with_its_interval(study: str) -> None:
-    tables = given(success_cases, study)
-    figure = success_cases.draw(**tables)
+def test_success_cases_draws_each_case_with_its_interval(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    tables = tables_for(success_cases)
+    figure = drawn(success_cases)
     *panels, _ = figure.axes
     shares = [(name, count) for name in ("overlap", "inside") for count in (5, 10)]
-    drawn = signs(figure)
-    assert list(drawn) == list(KINDS.values())
+    styles = signs(figure)
+    assert list(styles) == list(KINDS.values())
     names = [text.get_text() for text in panels[0].get_yticklabels()]
     assert names == list(tables["cases"]["case"].drop_duplicates())
-    assert len(names) == len(SUCCESS_CASES) or study == "telescope"
+    assert len(names) == len(SUCCESS_CASES)
     rows = tables["cases"].merge(tables["rank_curve"])
     for axes, (name, count) in zip(panels, shares, strict=True):
         assert axes.get_title().split() == [f"{name},", str(count), "shown"]
         assert axes.yaxis_inverted()
         for container, (crossing, words) in zip(axes.containers, KINDS.items(), strict=True):
-            assert (to_hex(container[0].get_color()), container[0].get_marker()) == drawn[words]
-            own = rows[(rows["demonstrations"] == count) & (rows["tasks.crossing"] == crossing)]
-            own = own.set_index("case").loc[names]
-            expected = 100 * own[[f"top_2_{name}{end}" for end in LIMITS]].to_numpy()
-            found = marks_and_ends(container)
-            np.testing.assert_array_equal(np.round(found[:, 1]), range(len(names)))
-            np.testing.assert_allclose(found[:, [0, 2, 3]], expected)
+            assert (to_hex(container[0].get_color()), container[0].get_marker()) == styles[words]
+            after = rows[(rows["demonstrations"] == count) & (rows["tasks.crossing"] == crossing)]
+            after = after.set_index("case").loc[names]
+            expected = 100 * after[[f"top_2_{name}{end}" for end in LIMITS]].to_numpy()
+            dots = marks_and_ends(container)
+            np.testing.assert_array_equal(np.round(dots[:, 1]), range(len(names)))
+            np.testing.assert_allclose(dots[:, [0, 2, 3]], expected)
         first, second = (marks_and_ends(container)[:, 1] for container in axes.containers)
         assert (first < second).all()
 
 
-def test_success_cases_draws_every_share_over_the_evidence() -> None:
-    tables = given(success_cases)
-    figure = success_cases.draw(**tables)
-    axes, drawn = figure.axes[-1], signs(figure)
+def test_success_cases_draws_every_share_over_the_evidence(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    tables, figure = tables_for(success_cases), drawn(success_cases)
+    axes, styles = figure.axes[-1], signs(figure)
     lines = [line for line in axes.lines if len(line.get_xdata()) > 2]
     assert len(lines) == len(SUCCESS_CASES) * len(KINDS)
     measures = tables["measures"].query("measure == 'truth_probability'")
     for crossing, words in KINDS.items():
-        own = [line for line in lines if to_hex(line.get_color()) == drawn[words][0]]
-        for line, (case, change) in zip(own, SUCCESS_CASES.items(), strict=True):
+        of_kind = [line for line in lines if to_hex(line.get_color()) == styles[words][0]]
+        for line, (case, change) in zip(of_kind, SUCCESS_CASES.items(), strict=True):
             settings = {"temperature": 1.0, "cells": 2500, "dt": 0.5, "samples": 3, **change}
             curve, chance = (
                 table.query(" and ".join(f"{key} == {value}" for key, value in settings.items()))[
@@ -390,40 +387,42 @@ def test_success_cases_draws_every_share_over_the_evidence() -> None:
             (mean,) = chance["mean"]
             np.testing.assert_allclose(line.get_xdata(), mean * np.arange(1, 21))
             np.testing.assert_allclose(line.get_ydata(), 100 * curve["top_2_overlap"])
-            filled = to_hex(line.get_markerfacecolor()) == drawn[words][0]
+            filled = to_hex(line.get_markerfacecolor()) == styles[words][0]
             assert filled == (case == "default"), case
-            assert line.get_marker() == drawn[words][1]
+            assert line.get_marker() == styles[words][1]
 
 
 @pytest.mark.parametrize("module", [success, success_cases])
-def test_a_study_of_one_kind_of_tasks_has_no_column_for_it(module: ModuleType) -> None:
-    tables = given(module)
+def test_a_study_of_one_kind_of_tasks_has_no_column_for_it(
+    module: ModuleType, drawn: Drawn, tables_for: TablesFor
+) -> None:
+    tables = tables_for(module)
     kind = {name: t[~t["tasks.crossing"]] for name, t in tables.items() if "tasks.crossing" in t}
     ranking = kind.pop("first_ranking")
     alone = {name: t if name.startswith("first") else t.drop(columns="tasks.crossing")
              for name, t in kind.items()}  # fmt: skip
     one = {**tables, **alone, "first_ranking": ranking}
-    both = module.draw(**tables)
+    both = drawn(module)
     figure = module.draw(**one)
     assert len(figure.axes) == (len(both.axes) // 2 if module is success else len(both.axes))
     words = "random tasks" if module is success else "all tasks"
     assert any(line.strip().startswith(words) for line in module.facts(**one).splitlines())
 
 
-def test_success_cases_show_what_there_is() -> None:
-    tables = given(success_cases)
+def test_success_cases_show_what_there_is(tables_for: TablesFor) -> None:
+    tables = tables_for(success_cases)
     few = tables["rank_curve"].query("demonstrations < 4")
     figure = success_cases.draw(**{**tables, "rank_curve": few})
     titles = [" ".join(axes.get_title().split()) for axes in figure.axes]
     assert titles == ["overlap, 3 shown", "inside, 3 shown", "overlap, all cases"]
 
 
-def test_success_cases_says_the_numbers() -> None:
-    tables = given(success_cases)
+def test_success_cases_says_the_numbers(tables_for: TablesFor) -> None:
+    tables = tables_for(success_cases)
     lines = success_cases.facts(**tables).splitlines()
     assert "1 to 20 demonstrations" in lines[1]
-    found = [line for line in lines if line.startswith("  ")]
-    assert len(found) == 2 * len(KINDS) * len(SUCCESS_CASES)
+    values = [line for line in lines if line.startswith("  ")]
+    assert len(values) == 2 * len(KINDS) * len(SUCCESS_CASES)
     for crossing, words in KINDS.items():
         row = of_default(tables["rank_curve"], crossing).query("demonstrations == 10").iloc[0]
         chance = of_default(tables["measures"], crossing).query("measure == 'truth_probability'")
@@ -435,12 +434,14 @@ def test_success_cases_says_the_numbers() -> None:
             for name in ("overlap", "inside")
         ]
         evidence = f"evidence {10 * chance['mean'].iloc[0]:.3g}"
-        assert f"  {words}, default, 10 demonstrations: {', '.join(said)}; {evidence}" in found
+        assert f"  {words}, default, 10 demonstrations: {', '.join(said)}; {evidence}" in values
 
 
 @pytest.mark.parametrize("module", [success, success_cases])
-def test_success_needs_a_truth_across_hypotheses_and_a_default(module: ModuleType) -> None:
-    tables = given(module)
+def test_success_needs_a_truth_across_hypotheses_and_a_default(
+    module: ModuleType, tables_for: TablesFor
+) -> None:
+    tables = tables_for(module)
     ranking = tables["first_ranking"]
     whole = ranking.assign(overlaps_truth=ranking["covered_by_truth"])
     with pytest.raises(Unsuited, match="the truth is made of whole hypotheses"):

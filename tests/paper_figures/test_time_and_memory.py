@@ -1,4 +1,4 @@
-"""The scale figure, against its table, and the table, against what the benchmark measures."""
+"""The figure of time and memory against its table, and this against what is measured."""
 
 from __future__ import annotations
 
@@ -11,24 +11,22 @@ import pytest
 from figure_study import scale_rows
 
 from experiments.config.paths import CHECKOUT
-from paper_figures import scale
-
-ROOT = CHECKOUT
+from paper_figures import time_and_memory
 
 
 def test_the_figure_shows_the_table() -> None:
-    left, right = scale.draw(scale_rows()).axes
+    left, right = time_and_memory.draw(scale_rows()).axes
     table = scale_rows()
     for axes, columns in ((left, ["discretise_s", "infer_s"]), (right, ["peak_mb"])):
         lines = [line for line in axes.lines if line.get_marker() != "None"]
-        drawn = [line.get_xydata() for line in lines]
+        curves = [line.get_xydata() for line in lines]
         expected = [
             table.loc[table["system"] == system, ["states", column]].to_numpy(dtype=float)
             for system in ("telescope", "torus")
             for column in columns
         ]
-        assert len(drawn) == len(expected)
-        for curve, values in zip(drawn, expected, strict=True):
+        assert len(curves) == len(expected)
+        for curve, values in zip(curves, expected, strict=True):
             np.testing.assert_allclose(curve, values)
         assert axes.get_xscale() == axes.get_yscale() == "log"
         assert [line.get_markerfacecolor() == "white" for line in lines] == [False] * len(
@@ -41,7 +39,7 @@ def test_the_figure_shows_the_table() -> None:
 
 
 def test_the_facts_are_the_tables() -> None:
-    lines = scale.facts(scale_rows()).splitlines()
+    lines = time_and_memory.facts(scale_rows()).splitlines()
     expected = "  telescope, 2000 states: 0.2 s and 0.02 s, 110 MB, at most 20 % of the cells"
     assert lines[4].startswith(expected)
     slope = np.log(0.44 / 0.11) / np.log(4)
@@ -51,10 +49,10 @@ def test_the_facts_are_the_tables() -> None:
 
 def test_the_benchmark_measures_what_the_figure_needs() -> None:
     command = [sys.executable, "-m", "tests.benchmark.scale", "torus", "5", "4", "5", "4"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     row = json.loads(done.stdout)
-    assert set(scale.TABLES["scale"]) <= set(row)
+    assert set(time_and_memory.TABLES["scale"]) <= set(row)
     assert (row["states"], row["actions"], row["hypotheses"], row["steps"]) == (400, 15, 100, 20)
     assert 0 < row["largest_active_share"] <= 1
     parts = row["discretise_s"] + row["infer_s"]

@@ -1,11 +1,8 @@
-"""What each figure of the paper draws and says, against the tables that it was given.
-
-Every check runs on tables whose numbers are known, and on those of the paper's study.
-"""
+"""What each figure of the paper draws and says, against tables whose numbers are known."""
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -18,41 +15,20 @@ from matplotlib.colors import to_hex
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
-from experiments.config.paths import CHECKOUT
 from paper_figures import (
     final_state_error,
     hypothesis_map,
     overview,
     rank_curve,
+    sampled_trajectories,
     state_space,
-    trajectories,
     violation_distance,
 )
 from paper_figures.rows import Unsuited
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, DEMONSTRATION, GOAL, SAMPLED, START, TRUTH
 
-PAPER = CHECKOUT / "results" / "paper" / "tables"
-HAS_EXAMPLES = (PAPER / "example_ranking.csv").is_file()
-STUDIES = ["known", "paper"] if HAS_EXAMPLES else ["known"]
-
-every_study = pytest.mark.parametrize("study", STUDIES)
-
-
-@cache
-def tables_of(study: str) -> dict[str, pd.DataFrame]:
-    if study == "known":
-        return study_tables()
-    return {name: pd.read_csv(PAPER / f"{name}.csv") for name in study_tables()}
-
-
-def given(module: ModuleType, study: str) -> dict[str, pd.DataFrame]:
-    """The tables that a module needs."""
-    return {name: tables_of(study)[name] for name in module.TABLES}
-
-
-@cache
-def drawn(module: ModuleType, study: str) -> Figure:
-    return module.draw(**given(module, study))
+Drawn = Callable[[ModuleType], Figure]
+TablesFor = Callable[[ModuleType], dict[str, pd.DataFrame]]
 
 
 def corners(boxes: pd.DataFrame, prefix: str = "") -> np.ndarray:
@@ -103,24 +79,25 @@ def assert_curves(axes: Axes, rows: pd.DataFrame) -> None:
             np.testing.assert_allclose(line.get_ydata(), joined)
 
 
-def measure_rows(study: str, measure: str) -> pd.DataFrame:
+def rows_of(measure: str) -> pd.DataFrame:
     """Rows of one measure with 9 actions, and the share of goals reached beside them."""
-    table = tables_of(study)["measures"]
+    table = study_tables()["measures"]
     table = table[(table["actions"] == 9) & (table["samples"] == 1)]
     share = table[table["measure"] == "reachable"].rename(columns={"mean": "reachable"})
     keys = ["truth", "cells", "dt"]
     return table[table["measure"] == measure].merge(share[[*keys, "reachable"]], on=keys)
 
 
-@every_study
-def test_final_state_error_is_the_measure_with_its_interval(study: str) -> None:
-    figure, rows = drawn(final_state_error, study), measure_rows(study, "final_state_error")
+def test_final_state_error_is_the_measure_with_its_interval(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    figure, rows = drawn(final_state_error), rows_of("final_state_error")
     for axes, (truth, part) in zip(figure.axes, rows.groupby("truth"), strict=True):
         assert axes.get_title(loc="left") == f"truth {truth.upper()}"
         assert_curves(axes, part)
     assert figure.get_supylabel() == "final-state error [share of the ranges]"
     assert figure.axes[-1].get_xlabel() == "$\\Delta t$ [s]"
-    said = final_state_error.facts(**given(final_state_error, study)).splitlines()
+    said = final_state_error.facts(**tables_for(final_state_error)).splitlines()
     for row in rows.itertuples():
         start = f"  {row.truth.upper()}, {row.cells} cells, dt {row.dt:g} s: "
         (line,) = (line for line in said if line.startswith(start))
@@ -129,13 +106,14 @@ def test_final_state_error_is_the_measure_with_its_interval(study: str) -> None:
         assert line == f"{start}{expected}; goals reached {100 * row.reachable:.0f} %"
 
 
-@every_study
-def test_violation_distance_floor_and_pooled_have_panels(study: str) -> None:
-    figure = drawn(violation_distance, study)
+def test_violation_distance_floor_and_pooled_have_panels(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    figure = drawn(violation_distance)
     panels = iter(figure.axes)
-    said = violation_distance.facts(**given(violation_distance, study))
+    said = violation_distance.facts(**tables_for(violation_distance))
     for measure in ("violation_distance", "violation_floor", "violation_distance_pooled"):
-        rows = measure_rows(study, measure)
+        rows = rows_of(measure)
         for truth, part in rows.groupby("truth"):
             axes = next(panels)
             assert axes.get_title(loc="left").startswith(f"truth {truth.upper()}, ")
@@ -146,11 +124,12 @@ def test_violation_distance_floor_and_pooled_have_panels(study: str) -> None:
     assert figure.axes[0].get_ylabel() == "distance [regions]"
 
 
-@every_study
-def test_rank_curves_are_the_medians_bands_and_shares_of_the_table(study: str) -> None:
-    table = tables_of(study)["rank_curve"]
+def test_rank_curves_are_the_medians_bands_and_shares_of_the_table(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    table = study_tables()["rank_curve"]
     wanted = table[(table["actions"] == 9) & (table["samples"] == 1)]
-    figure = drawn(rank_curve, study)
+    figure = drawn(rank_curve)
     truths, dts = sorted(set(wanted["truth"])), sorted(set(wanted["dt"]))
     grid = np.array(figure.axes).reshape(len(dts), 2 * len(truths))
     for (truth, dt), part in wanted.groupby(["truth", "dt"]):
@@ -182,9 +161,10 @@ def test_rank_curves_are_the_medians_bands_and_shares_of_the_table(study: str) -
         ) in said
 
 
-@every_study
-def test_state_space_has_all_hypotheses_and_both_truths(study: str) -> None:
-    tables, figure = given(state_space, study), drawn(state_space, study)
+def test_state_space_has_all_hypotheses_and_both_truths(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    tables, figure = tables_for(state_space), drawn(state_space)
     axes = figure.axes[0]
     one = tables["example_ranking"][tables["example_ranking"]["truth"] == "c1"]
     (hypotheses,) = boxes(axes)
@@ -206,18 +186,19 @@ def test_state_space_has_all_hypotheses_and_both_truths(study: str) -> None:
     assert f"{low[1]:.6g} to {high[1]:.6g} rad/s." in said
 
 
-def test_a_truth_that_leaves_the_circle_comes_back_on_the_other_side() -> None:
-    patches = drawn(state_space, "known").axes[0].patches
+def test_a_truth_that_leaves_the_circle_comes_back_on_the_other_side(drawn: Drawn) -> None:
+    patches = drawn(state_space).axes[0].patches
     lefts = sorted(patch.get_x() for patch in patches if patch.get_height() == 1.0)
     assert lefts == pytest.approx([5.5 - 2 * np.pi, 5.5])
 
 
-@every_study
-def test_trajectories_show_visited_cells_and_violations(study: str) -> None:
-    tables, figure = given(trajectories, study), drawn(trajectories, study)
+def test_trajectories_show_visited_cells_and_violations(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    tables, figure = tables_for(sampled_trajectories), drawn(sampled_trajectories)
     visits, violations = tables["compared_cells"], tables["compared_violations"]
     panels = visits.groupby(["truth", "cells"])
-    said = trajectories.facts(**tables)
+    said = sampled_trajectories.facts(**tables)
     for axes, ((truth, cells), visited) in zip(figure.axes, panels, strict=True):
         title = f"{truth.upper()}, {cells} cells, $\\Delta t$ = {visited['dt'].iloc[0]:g} s"
         assert axes.get_title(loc="left") == title
@@ -246,28 +227,29 @@ def test_trajectories_show_visited_cells_and_violations(study: str) -> None:
         assert f"{visited['cell'].nunique()} cells visited" in said
 
 
-def test_facts_count_the_violations_of_each_and_of_both() -> None:
-    said = trajectories.facts(**given(trajectories, "known"))
+def test_facts_count_the_violations_of_each_and_of_both(tables_for: TablesFor) -> None:
+    said = sampled_trajectories.facts(**tables_for(sampled_trajectories))
     assert (
         "C2, 1600 cells, 9 actions, dt 0.5 s, trial 1: 3 cells visited; hypotheses violated by the "
         f"demonstration 2, by the trajectory 2, by both 1 (point {'3' * 32})."
     ) in said
 
 
-def test_no_trial_that_all_grids_can_follow_makes_no_figure() -> None:
-    tables = given(trajectories, "known")
+def test_no_trial_that_all_grids_can_follow_makes_no_figure(tables_for: TablesFor) -> None:
+    tables = tables_for(sampled_trajectories)
     tables["compared_cells"] = tables["compared_cells"].head(0)
     with pytest.raises(Unsuited, match="no demonstration is feasible in all grids"):
-        trajectories.draw(**tables)
-    tables = given(overview, "known")
+        sampled_trajectories.draw(**tables)
+    tables = tables_for(overview)
     tables["example_cells"] = tables["example_cells"].head(0)
     with pytest.raises(Unsuited, match="no demonstration of the example is feasible"):
         overview.draw(**tables)
 
 
-@every_study
-def test_overview_is_one_run_from_demonstrations_to_ranks(study: str) -> None:
-    tables, figure = given(overview, study), drawn(overview, study)
+def test_overview_is_one_run_from_demonstrations_to_ranks(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    tables, figure = tables_for(overview), drawn(overview)
     shown, moves, chances, ranks = figure.axes[:4]
     of_c1 = {name: table[table["truth"] == "c1"] for name, table in tables.items()}
     ranking, visits = of_c1["example_ranking"], of_c1["example_cells"]
@@ -297,8 +279,8 @@ def test_overview_is_one_run_from_demonstrations_to_ranks(study: str) -> None:
     assert f"Phi in panel 3 {truth['unconstrained']:.3g}" in said
 
 
-def test_moves_past_a_whole_turn_stay_short() -> None:
-    moves = drawn(overview, "known").axes[1]
+def test_moves_past_a_whole_turn_stay_short(drawn: Drawn) -> None:
+    moves = drawn(overview).axes[1]
     columns = np.array([(arrow.xyann[0], arrow.xy[0]) for arrow in moves.texts]) / (np.pi / 2)
     # Four columns make a turn; 13 to 14, 14 to 2, and 2 to 6 and 7 go from the last to the second.
     expected = [[3.5, 3.5]] * 2 + [[3.5, 4.5]] * 2 + [[4.5, 5.5]] * 2
@@ -306,13 +288,9 @@ def test_moves_past_a_whole_turn_stay_short() -> None:
     assert np.array(moves.get_xlim()) / (np.pi / 2) == pytest.approx([2.5, 6.5])
 
 
-@every_study
-def test_hypothesis_map_shows_what_the_table_says(study: str) -> None:
-    tables = {
-        name: table[table["truth"] == "c1"] for name, table in given(hypothesis_map, study).items()
-    }
+def test_hypothesis_map_shows_what_the_table_says(drawn: Drawn, tables_for: TablesFor) -> None:
+    tables, figure = tables_for(hypothesis_map), drawn(hypothesis_map)
     ranking = tables["example_ranking"]
-    figure = hypothesis_map.draw(**tables)
     axes = figure.axes[0]
     feasible, violated = boxes(axes)
     kept = ranking[ranking["feasible"]]
@@ -335,9 +313,6 @@ def test_hypothesis_map_shows_what_the_table_says(study: str) -> None:
 
 
 def test_map_says_which_point_it_is() -> None:
-    tables = {
-        name: table[table["truth"] == "c2"]
-        for name, table in given(hypothesis_map, "known").items()
-    }
+    tables = {name: study_tables()[name].query("truth == 'c2'") for name in hypothesis_map.TABLES}
     point = f"Point {POINTS['c2']}: truth C2, 400 cells, 9 actions, dt = 0.25 s."
     assert point in hypothesis_map.facts(**tables)
