@@ -20,7 +20,7 @@ figures: $(READY) ## draw all figures and write the report again, from the table
 	$(BIN)/python -m paper_figures
 	@$(MAKE) --no-print-directory report
 
-report: $(READY) ## write results/paper/REPORT.md and .html, and the numbers in README.md
+report: $(READY) ## write results/paper/REPORT.md and .html
 	$(BIN)/python -m paper_figures.report
 
 smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke

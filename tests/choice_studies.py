@@ -51,7 +51,7 @@ def choice_effect_tables() -> dict[str, pd.DataFrame]:
 
 
 def start_point_tables() -> dict[str, pd.DataFrame]:
-    """Two truths and time steps; one of the three settings of the cells has several start points."""
+    """Two truths and time steps; one of three settings of the cells has several start points."""
     rows = [
         settings_row(cells, dt, samples, truth)
         for truth in ("c1", "c2")
