@@ -11,7 +11,6 @@ if __name__ == "__main__":  # before all that takes time to import
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -151,7 +150,7 @@ def _save(
     )
     # What decides the result: the settings that do, and the numbers that were read.
     made_from = {
-        "config": plain(replace(settings, demonstrations="", results=None, top=0)),
+        "config": {**plain(settings), "demonstrations": "", "results": None, "top": 0},
         "paths": digest(csv_bytes(paths)),
     }
     results = results_folder(settings) / "inference"

@@ -45,13 +45,14 @@ EVERYTHING = " ".join(PACKAGES)
 ROOMS = {
     TRACKING: "",
     "experiments.config.paths": TRACKING,
+    "experiments.config.suggestions": "",
     "experiments.config": f"mlci {TRACKING}",
     "experiments.console": "mlci",
     "experiments.point": f"{POINT} experiments.console",
     "experiments.collate": TRACKING,
     "experiments.sweep": f"{POINT} experiments.console experiments.point experiments.collate",
     "experiments.lookback": f"{TRACKING} experiments.collate experiments.config.paths "
-    "experiments.console",
+    "experiments.config.suggestions experiments.console",
     "paper_figures": f"mlci.regions {TRACKING} experiments.config.paths",
     # The door: the commands, and what they share.
     "experiments.app": EVERYTHING,
@@ -72,18 +73,14 @@ experiments.collate.join imports experiments.point.tables
 experiments.collate.reliability imports experiments.config.settings
 experiments.collate.reliability imports experiments.point.beliefs
 experiments.collate.reliability imports mlci.spaces
-experiments.collate.settings_of imports experiments.config.schema
+experiments.collate.settings_of imports experiments.config.problems
 experiments.collate.settings_of imports experiments.config.settings
-experiments.config.paths imports experiments.config.settings
-experiments.lookback.archive imports experiments.config.schema
 experiments.lookback.freshness imports paper_figures.figure_notes
 """
 
 LONGEST = 300  # lines of a module
 LONGER = {
     # module: why it is in one piece
-    "experiments/config/checks.py": "not yet in parts",
-    "experiments/config/settings.py": "not yet in parts",
     "mlci/ilqr.py": "not yet in parts",
 }
 NAMES_THAT_SAY_NOTHING = {"common", "helpers", "misc", "util", "utils"}

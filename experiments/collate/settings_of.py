@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from experiments.config.schema import Problems, parse
+from experiments.config.problems import checked
 from experiments.config.settings import Settings
 
 if TYPE_CHECKING:
@@ -15,5 +15,8 @@ if TYPE_CHECKING:
 @cache
 def settings_of(point: Point) -> Settings:
     """The settings of a point, read back from its config."""
-    settings: Settings = parse(Settings, point.config, "", Problems())
-    return settings
+    system = point.config["system"]
+    return checked(
+        Settings,
+        {**point.config, "system": {"_target_": system["target"], **system["arguments"]}},
+    )

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from experiments.config.paths import CONF, is_inside_checkout
-from experiments.config.read import ConfigError
+from experiments.config.problems import ConfigError
 
 
 def command_words(words: Sequence[str]) -> list[str]:

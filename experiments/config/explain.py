@@ -18,8 +18,9 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from experiments.config.paths import CONF
-from experiments.config.read import ConfigError, known_keys
-from experiments.config.schema import did_you_mean
+from experiments.config.problems import ConfigError, field_keys
+from experiments.config.settings import RunSettings
+from experiments.config.suggestions import did_you_mean
 
 
 def explain(error: BaseException) -> str:
@@ -78,10 +79,15 @@ def _explain_override(error: HydraException | OmegaConfBaseException) -> str:
     if unknown := re.search(r"Could not override '([^']+)'", str(error)):
         key = unknown[1]
         parent = getattr(error.__cause__, "parent_node", None)
-        known = [str(name) for name in parent] if isinstance(parent, DictConfig) else known_keys()
+        known = [str(name) for name in parent] if isinstance(parent, DictConfig) else _known_keys()
         return f"{key}: unknown key{did_you_mean(key.rpartition('.')[2], known)}"
     key = getattr(error.__cause__ or error, "full_key", None)
     return f"{key}: {_first_line(error)}" if key else _first_line(error)
+
+
+def _known_keys() -> list[str]:
+    """Every dotted key of a config, groups of files included."""
+    return [*field_keys(RunSettings), "experiment", "subject", "scale"]
 
 
 def _first_line(error: BaseException) -> str:

@@ -1,16 +1,28 @@
-"""Where configs and results are: in the checkout, or beside the code of an installed wheel."""
+"""The one rule for where configs and results are; light, so that anything may import it.
+
+Configs lie in the checkout, or beside the code of an installed wheel; results in the checkout if
+that is where one works, else in the current folder.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Protocol
 
-from experiments.config.settings import RecordedSettings, StudySettings
 from experiments.tracking import environment
 
 _CODE = Path(__file__).resolve().parents[1]
 
 CHECKOUT = environment.CHECKOUT
 CONF = _CODE / "conf" if CHECKOUT is None else CHECKOUT / "conf"
+
+
+class _HasResults(Protocol):
+    """Settings that may name a folder of results."""
+
+    @property
+    def results(self) -> str | None:
+        """The folder's name; None for the usual one."""
 
 
 def is_inside_checkout() -> bool:
@@ -24,7 +36,6 @@ def default_results() -> Path:
     return home / "results"
 
 
-def results_folder(settings: StudySettings | RecordedSettings) -> Path:
-    """Where results go: the usual folder unless another is given."""
-    given = settings.results
-    return default_results() if given is None else Path(given).resolve()
+def results_folder(settings: _HasResults) -> Path:
+    """Where results go: the usual folder unless the settings name another."""
+    return default_results() if settings.results is None else Path(settings.results).resolve()

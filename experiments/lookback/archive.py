@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from experiments.config.schema import did_you_mean
+from experiments.config.suggestions import did_you_mean
 from experiments.tracking.points import Point, State
 from experiments.tracking.study import Study, StudyError, read_study
 from experiments.tracking.trees import flatten

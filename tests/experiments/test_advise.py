@@ -152,9 +152,9 @@ def test_each_rule_of_the_recommendation_gives_way_to_the_one_before() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["dts=[0.25,0.3]"], "dts: 0.3 does not cut the horizon 5.0 into whole steps; try"),
+        (["dts=[0.25,0.3]"], "dts[1]: 0.3 does not cut the horizon 5.0 into whole steps; try"),
         (["dts=[]"], "dts: [] is empty"),
-        (["dts=[-1.0]"], "dts: [-1.0] must be above 0"),
+        (["dts=[-1.0]"], "dts[0]: -1.0 must be above 0"),
         (["pairs=0"], "pairs: 0 must be at least 1"),
         (["remedy=0"], "remedy: 0 must be at least 1"),
         (["budget=50"], "budget: 50 states hold none of the grids; raise it, or set grids"),

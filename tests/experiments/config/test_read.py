@@ -2,7 +2,9 @@
 
 import dataclasses
 import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from tiny_point import composed, planned
 
 from experiments.config.paths import CONF
 from experiments.config.read import ConfigError, read_config
-from experiments.config.schema import Problems, parse
+from experiments.config.settings import Region
 
 
 def options(group: str) -> list[str]:
@@ -70,23 +72,6 @@ def test_defaults_are_the_walk_of_the_paper() -> None:
     assert read.upper[0] == pytest.approx(9 / 5 * math.pi)
 
 
-@pytest.mark.parametrize(
-    ("words", "value"),
-    [
-        ("pi", 1),
-        ("6/5 pi", 1.2),
-        ("-pi/2", -0.5),
-        ("2pi", 2),
-        ("1.5 * pi", 1.5),
-        ("-3/4 pi", -0.75),
-    ],
-)
-def test_multiples_of_pi_in_words(words: str, value: float) -> None:
-    problems = Problems()
-    assert parse(float, words, "key", problems) == pytest.approx(value * math.pi, rel=1e-15)
-    assert not problems
-
-
 def test_spelling_does_not_change_identity() -> None:
     same = [
         identity("dt=1"),
@@ -98,22 +83,37 @@ def test_spelling_does_not_change_identity() -> None:
     assert len(set(same)) == 1
 
 
+def changed(value: Any) -> Iterator[Any]:
+    """Copies of settings, each with one value changed; another value where it is none."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        for field in dataclasses.fields(value):
+            for other in changed(getattr(value, field.name)):
+                yield dataclasses.replace(value, **{field.name: other})
+    elif isinstance(value, Mapping):
+        yield {**value, "another": 1.0}
+    elif isinstance(value, bool):
+        yield not value
+    elif isinstance(value, str):
+        yield "escapes" if value == "equation" else f"{value}2"
+    elif isinstance(value, tuple):
+        yield value[:-1] if len(value) > 1 else value * 2
+    elif value is None:
+        yield (0.25,)
+    else:
+        yield value + (0.125 if isinstance(value, float) else 1)
+
+
 def test_every_setting_changes_identity() -> None:
-    settings, _ = read_config(composed())
-
-    def variants(value: object) -> list:
-        """Copies of a nested dataclass, each with one leaf changed."""
-        if not dataclasses.is_dataclass(value):
-            return ["another"]
-        return [
-            dataclasses.replace(value, **{field.name: other})
-            for field in dataclasses.fields(value)
-            for other in variants(getattr(value, field.name))
-        ]
-
-    found = variants(settings)
-    assert len(found) > 30
-    assert len({planned(other, Path()).identity for other in [settings, *found]}) == len(found) + 1
+    settings, _ = read_config(composed("safety.margin=0.1", "truth=cell", "truth.cell=5"))
+    boxes = (Region((0.0, None), (1.0, None)),)
+    truth = dataclasses.replace(settings.truth, boxes=boxes)
+    hypotheses = dataclasses.replace(settings.hypotheses, boxes=boxes)
+    settings = dataclasses.replace(settings, truth=truth, hypotheses=hypotheses)
+    others = list(changed(settings))
+    assert len(others) > 30
+    assert (
+        len({planned(other, Path()).identity for other in [settings, *others]}) == len(others) + 1
+    )
 
 
 CASES = "hydra.sweeper.cases="
@@ -148,18 +148,18 @@ WRONG = [
     ("dt=7", "dt: 7.0 does not cut the horizon 5.0 into whole steps; try 5"),
     ("dt=1e-300", "dt: 1e-300 cuts the horizon 5.0 into more than 100000 steps"),
     ("demonstrations.dt=0.03", "demonstrations.dt: 0.03 does not cut the horizon"),
-    ("seed=-1", "seed: -1 must not be below 0"),
+    ("seed=-1", "seed: -1 must be at least 0"),
     ("seed=1.5", "seed: 1.5 is not a whole number"),
     ("temperature=0", "temperature: 0.0 must be above 0"),
     ("actions=0", "actions: 0 must be at least 1"),
     ("actions=[3,4]", "actions: [3, 4] must be one number, or a list of 1"),
     ("grid.shape=[100000,100000]", "1 samples and these hypotheses takes about 1.22e+04 GB"),
-    ("rollouts=10000000", "rollouts: 10000000 is above 1000000"),
+    ("rollouts=10000000", "rollouts: 10000000 must be at most 1000000"),
     ("transition.samples=0", "transition.samples: 0 must be at least 1"),
-    ("inference.prior=1", "inference.prior: 1.0 must lie between 0 and 1"),
+    ("inference.prior=1", "inference.prior: 1.0 must be below 1"),
     ("demonstrations.keep=101", "demonstrations.keep: 101 is more than the 100 of"),
     ("grid.shape=[]", "grid.shape: [] is empty"),
-    ("grid.shape=[0,5]", "grid.shape: [0, 5] must be at least 1"),
+    ("grid.shape=[0,5]", "grid.shape[0]: 0 must be at least 1"),
     ("grid.shape=9", "grid.shape: 9 is not a list"),
     (
         "grid.shape=[5,6,7]",
@@ -169,22 +169,22 @@ WRONG = [
     ("truth.boxes=[]", "truth.boxes: [] is empty; give at least one box, with lower and upper, or"),
     ("truth.name=none", "truth.name: none means that nothing is forbidden; take another name"),
     ("truth.cell=37", "truth.cell: 37 and 1 boxes are given; keep one of them"),
-    ("calibration.sets=-1", "calibration.sets: -1 must not be below 0"),
+    ("calibration.sets=-1", "calibration.sets: -1 must be at least 0"),
     (
         "calibration.sets=2",
         "calibration.sets: 2, but the prior knows no such truth; take",
     ),
     ("calibration.demonstrations=[]", "calibration.demonstrations: [] is empty"),
-    ("calibration.demonstrations=[0]", "calibration.demonstrations: [0] must be at least 1"),
-    ("truth.cell=-1", "truth.cell: -1 must not be below 0"),
+    ("calibration.demonstrations=[0]", "calibration.demonstrations[0]: 0 must be at least 1"),
+    ("truth.cell=-1", "truth.cell: -1 must be at least 0"),
     ("grid.offset=[0.5]", "grid.offset: [0.5] must have 2 entries, one each for angle"),
-    ("grid.offset=[1,0]", "grid.offset: [1.0, 0.0] must be shares of a cell, from 0 to below 1"),
+    ("grid.offset=[1,0]", "grid.offset[0]: 1.0 must be below 1"),
     ("grid.offset=[0,0.5]", "grid.offset: [0.0, 0.5] shifts angular_velocity, which has ends"),
     ("tasks.goal=[0.1]", "tasks.goal: [0.1] must have 2 entries, one each for angle"),
-    ("tasks.goal=[0.1,-1]", "tasks.goal: [0.1, -1.0] must not be below 0"),
+    ("tasks.goal=[0.1,-1]", "tasks.goal[1]: -1.0 must be at least 0"),
     ("tasks.lower=[null,3.0]", "tasks: angular_velocity goes from 3.0 to 2.0"),
     ("tasks.crossing=1", "tasks.crossing: 1 is not true or false"),
-    ("safety.method=magic", "safety.method: 'magic' is none of equation, escapes"),
+    ("safety.method=magic", "safety.method: 'magic' must be 'equation' or 'escapes'"),
     ("truth.boxes=[{lower:[0],upper:[1]}]", "truth.boxes[0].lower: [0.0] must have 2 entries"),
     ("truth.boxes=[{lower:[0,1],upper:[1,0]}]", "angular_velocity goes from 1.0 to 0.0"),
     ("truth.boxes=[{lower:[0,null],upper:[1,0]}]", "angular_velocity has one side only"),
@@ -196,6 +196,30 @@ WRONG = [
     ("sweep.time_limit=5", "sweep.time_limit: only a sweep heeds it; add -m, or leave it out"),
     ("sweep.retries=1", "sweep.retries: only a sweep heeds it"),
     ("workers=0", "workers: 0 must be at least 1"),
+    ("dt=pi/0", "dt: 'pi/0' is not a finite number, or a multiple of pi such as \"6/5 pi\""),
+    ("seed=" + "9" * 4000, "seed: 9999999999"),
+    ("seed=4294967296", "seed: 4294967296 must be below 4294967296"),
+    (
+        "safety.shape=[1,2]",
+        "safety.shape: [1, 2] has no cell centre inside the truth's box 0 along "
+        "angle and angular_velocity; use more cells",
+    ),
+    ("safety.shape=[100000,100000]", "safety.shape: [100000, 100000] makes too many values"),
+    ("safety.shape=[5]", "safety.shape: [5] must have 2 entries, one each for angle"),
+    (
+        "safety.margin=1e308",
+        "safety.margin: 1e+308 is more than the state space is wide, 12; lower",
+    ),
+    ("safety.width=12.5", "safety.width: 12.5 is more than the state space is wide, 12; lower it"),
+    ("truth.boxes=[{lower:[null,null],upper:[null,null]}]", "truth.boxes[0]: forbids every state"),
+    ("truth.boxes=3", "truth.boxes: 3 is not a list"),
+    ("truth.boxes=[3]", "truth.boxes[0]: 3 is not a group of values"),
+    ("truth.boxes=[{lower:[0,1]}]", "truth.boxes[0].upper: missing; give it a value"),
+    ("truth.name=3", "truth.name: 3 is not a word"),
+    ("actions=[3.5]", "actions[0]: 3.5 is not a whole number"),
+    ("actions=[]", "actions: [] is empty; give at least one"),
+    ("sweep.only=[done]", "sweep.only[0]: 'done' must be 'missing', 'failed' or 'stale'"),
+    ("+sweep.foo=1", "sweep.foo: unknown key; known are dry_run, fail_fast, force, limit, "),
     ("hydra.run.dirr=x", "hydra.run.dirr: unknown key; did you mean dir?"),
 ]
 

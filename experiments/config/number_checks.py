@@ -1,0 +1,84 @@
+"""What is wrong with numbers that do not go together, and with a study's options.
+
+Types and ranges of single values stand beside the fields, in `experiments.config.settings`. Each
+check yields a line for each fault: the key, the value and the way out.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+
+from experiments.config.memory import expected_memory, machine_memory
+from experiments.config.settings import AdviceSettings, ModelSettings, Settings, StudySettings
+
+_MOST_STEPS = 100_000
+_TAKEN = ("points", "store", "diffs", "inference")  # among the folders of results
+
+
+def study_problems(study: StudySettings) -> Iterator[str]:
+    """A name that cannot be a folder's, and options that exclude each other."""
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", study.study) or study.study in _TAKEN:
+        yield (
+            f"study: {study.study!r} cannot name a folder of results; use letters, digits, - and _ "
+            f"({', '.join(_TAKEN)} are taken)"
+        )
+    sweep = study.sweep
+    if sweep.only is not None and sweep.force:
+        yield "sweep.force: it runs points in every state; give it without sweep.only"
+    if sweep.retries and sweep.fail_fast:
+        yield "sweep.retries: nothing is tried again with sweep.fail_fast; give one of them"
+
+
+def count_problems(settings: Settings) -> Iterator[str]:
+    """More demonstrations than pairs, and time steps that do not divide the horizon."""
+    demonstrations = settings.demonstrations
+    if demonstrations.keep > demonstrations.pairs:
+        yield (
+            f"demonstrations.keep: {demonstrations.keep} is more than the {demonstrations.pairs} "
+            "of demonstrations.pairs; lower it, or raise pairs"
+        )
+    yield from _division_problems("dt", settings.dt, settings.horizon)
+    yield from _division_problems("demonstrations.dt", demonstrations.dt, settings.horizon)
+
+
+def advice_count_problems(settings: AdviceSettings) -> Iterator[str]:
+    """Time steps that do not divide the horizon."""
+    for i, dt in enumerate(settings.dts):
+        yield from _division_problems(f"dts[{i}]", dt, settings.horizon)
+
+
+def budget_problems(settings: AdviceSettings) -> Iterator[str]:
+    """A budget that is too small for every grid."""
+    if not settings.grids_to_try:
+        yield f"budget: {settings.budget} states hold none of the grids; raise it, or set grids"
+
+
+def size_problems(settings: ModelSettings) -> Iterator[str]:
+    """What is too large to hold."""
+    needed, there = expected_memory(settings) / 1e9, machine_memory() / 1e9
+    if needed > there:
+        yield (
+            f"grid.shape: {list(settings.grid.shape)} with {list(settings.action_counts)} actions, "
+            f"{settings.transition.samples} samples and these hypotheses takes about {needed:.3g} "
+            f"GB, and this machine has {there:.3g}; use fewer cells, actions, samples or hypotheses"
+        )
+
+
+def _division_problems(key: str, dt: float, horizon: float) -> Iterator[str]:
+    """The horizon has to be a whole number of steps."""
+    steps = horizon / dt
+    if steps > _MOST_STEPS:
+        yield f"{key}: {dt} cuts the horizon {horizon} into more than {_MOST_STEPS} steps; raise it"
+    elif round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+        below = (horizon / count for count in range(math.floor(steps) + 1, 2 * _MOST_STEPS))
+        above = (horizon / count for count in range(math.floor(steps), 0, -1))
+        near = [next(filter(_is_short, values), None) for values in (below, above)]
+        ways = " or ".join(f"{value:.4g}" for value in near if value is not None)
+        yield f"{key}: {dt} does not cut the horizon {horizon} into whole steps; try {ways}"
+
+
+def _is_short(value: float) -> bool:
+    """Whether four digits write a number exactly, as far as a whole number of steps needs it."""
+    return math.isclose(float(f"{value:.4g}"), value, rel_tol=1e-12)

@@ -1,0 +1,119 @@
+"""Validation errors of pydantic as lines for a person: full key, value, and what to do."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import typing
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from experiments.config.settings import SystemSettings, system_class
+from experiments.config.settings.kinds import LIST, ONE
+from experiments.config.suggestions import did_you_mean
+
+T = typing.TypeVar("T")
+
+
+class ConfigError(Exception):
+    """A config that cannot be run; the message has a line for each thing to put right."""
+
+
+# By pydantic's type of an error; its numbers fill in the words.
+_WORDS = {
+    "missing": "missing; give it a value",
+    "number_type": '{value} is not a finite number, or a multiple of pi such as "6/5 pi"',
+    **dict.fromkeys(("int_type", "int_from_float"), "{value} is not a whole number"),
+    "bool_type": "{value} is not true or false",
+    "string_type": "{value} is not a word",
+    "tuple_type": "{value} is not a list",
+    **dict.fromkeys(("dataclass_type", "dict_type"), "{value} is not a group of values"),
+    "literal_error": "{value} must be {expected}",
+    "greater_than": "{value} must be above {gt:.16g}",
+    "greater_than_equal": "{value} must be at least {ge:.16g}",
+    "less_than": "{value} must be below {lt:.16g}",
+    "less_than_equal": "{value} must be at most {le:.16g}",
+    "too_short": "{value} is empty; give at least one",
+    "problem": "{words}",
+}
+
+
+def checked(kind: type[T], tree: Mapping[str, Any]) -> T:
+    """A tree of plain values as settings.
+
+    Raises:
+        ConfigError: with a line for each value that does not fit.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(_without_missing(tree))
+    except ValidationError as error:
+        raise ConfigError("\n".join(_lines(error, kind, tree))) from None
+
+
+def field_keys(kind: Any, prefix: str = "") -> list[str]:
+    """Dotted names of a dataclass's fields, and of the fields of those that hold dataclasses."""
+    keys = []
+    for name, hint in typing.get_type_hints(kind).items():
+        keys.append(prefix + name)
+        if (group := _group(hint)) and group is not SystemSettings:
+            keys += field_keys(group, f"{prefix}{name}.")
+    return keys
+
+
+def _lines(error: ValidationError, kind: Any, tree: Mapping[str, Any]) -> Iterator[str]:
+    """A line for each of the errors."""
+    for each in error.errors(include_url=False):
+        place = [part for part in each["loc"] if part not in (ONE, LIST)]
+        key = _dotted(place) or "config"
+        if each["type"] == "too_short" and each["input"]:
+            continue  # entries that are wrong do not count, and have lines of their own
+        if each["type"] in ("unexpected_keyword_argument", "extra_forbidden", "invalid_key"):
+            yield f"{key}: {_unknown(place, kind, tree)}"
+        elif each["type"] == "missing" and place[0] == "system":
+            name = tree["system"]["_target_"].rpartition(".")[2]
+            yield f"{key}: missing; {name} needs it"
+        elif each["type"] in _WORDS:
+            details = {**each.get("ctx", {}), "value": _short(each["input"])}
+            yield f"{key}: " + _WORDS[each["type"]].format(**details)
+        else:
+            yield f"{key}: {_short(each['input'])} does not fit: {each['msg']}"
+
+
+def _unknown(place: list[Any], kind: Any, tree: Mapping[str, Any]) -> str:
+    """What to say about a key that nobody knows."""
+    *parents, name = place
+    if parents == ["system"]:
+        system = system_class(tree["system"]["_target_"])
+        known = did_you_mean(name, inspect.signature(system).parameters)
+        return f"{system.__name__} has no such argument{known}"
+    above = "".join(f"{part}." for part in parents if isinstance(part, str))
+    beside = [key.removeprefix(above) for key in field_keys(kind) if key.startswith(above)]
+    return f"unknown key{did_you_mean(name, [key for key in beside if '.' not in key])}"
+
+
+def _group(hint: Any) -> Any:
+    """The dataclass that a type hint is, or holds as an entry of a list or beside None."""
+    if dataclasses.is_dataclass(hint):
+        return hint
+    return next(filter(None, map(_group, typing.get_args(hint))), None)
+
+
+def _without_missing(tree: Any) -> Any:
+    """A tree without the values that are still to be given, written `???`."""
+    if isinstance(tree, Mapping):
+        return {key: _without_missing(part) for key, part in tree.items() if part != "???"}
+    return tree
+
+
+def _dotted(place: list[Any]) -> str:
+    """A key as one writes it, such as truth.boxes[0].lower."""
+    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in place)
+    return "".join(parts).removeprefix(".")
+
+
+def _short(value: object) -> str:
+    """A value as text, cut where it is long."""
+    text = repr(list(value) if isinstance(value, tuple) else value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,46 @@
+"""Every value of a config, in frozen dataclasses: its type, range, meaning and unit."""
+
+from experiments.config.settings.advice import AdviceSettings
+from experiments.config.settings.parts import (
+    NO_TRUTH,
+    CalibrationSettings,
+    DemonstrationSettings,
+    GridSettings,
+    HypothesesSettings,
+    InferenceSettings,
+    RankSettings,
+    Region,
+    SafetySettings,
+    TaskSettings,
+    TransitionSettings,
+    TruthSettings,
+)
+from experiments.config.settings.point import ModelSettings, Settings, SubjectSettings
+from experiments.config.settings.recorded import RecordedSettings
+from experiments.config.settings.study import RunSettings, StudySettings, SweepSettings
+from experiments.config.settings.system import SystemSettings, system_class
+
+__all__ = [
+    "NO_TRUTH",
+    "AdviceSettings",
+    "CalibrationSettings",
+    "DemonstrationSettings",
+    "GridSettings",
+    "HypothesesSettings",
+    "InferenceSettings",
+    "ModelSettings",
+    "RankSettings",
+    "RecordedSettings",
+    "Region",
+    "RunSettings",
+    "SafetySettings",
+    "Settings",
+    "StudySettings",
+    "SubjectSettings",
+    "SweepSettings",
+    "SystemSettings",
+    "TaskSettings",
+    "TransitionSettings",
+    "TruthSettings",
+    "system_class",
+]

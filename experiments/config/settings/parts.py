@@ -1,0 +1,220 @@
+"""The groups of a config, such as `grid` and `truth`: one dataclass each."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from experiments.config.settings.kinds import (
+    STRICT,
+    Count,
+    CountOrNone,
+    Flag,
+    Index,
+    NotNegative,
+    Number,
+    Positive,
+    Probability,
+    Share,
+    Word,
+    about,
+)
+from mlci.regions import ConstraintSet
+from mlci.spaces import Box, StateSpace
+
+NO_TRUTH = "none"  # the truth's name where nothing is forbidden
+
+Shape = Annotated[tuple[Count, ...], Field(min_length=1)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Region:
+    """A box of states; None leaves that dimension free, at both ends."""
+
+    lower: Annotated[
+        tuple[Number | None, ...],
+        about("lower ends, one a dimension; null leaves a dimension free", "of the state"),
+    ]
+    upper: Annotated[tuple[Number | None, ...], about("upper ends", "of the state")]
+
+    def box(self) -> Box:
+        """The region with infinite sides where a dimension is free."""
+        return Box(
+            np.array([-np.inf if side is None else side for side in self.lower]),
+            np.array([np.inf if side is None else side for side in self.upper]),
+        )
+
+
+@dataclass(frozen=True, config=STRICT)
+class TaskSettings(Region):
+    """Where starts and goals are drawn, and which of the tasks count."""
+
+    goal: Annotated[
+        tuple[NotNegative | None, ...] | None,
+        about(
+            "how far a goal reaches around its state in each dimension, null if free; null alone "
+            "makes it a point",
+            "of the state",
+        ),
+    ]
+    crossing: Annotated[
+        Flag, about("only tasks whose optimum, were there no constraint, would enter the truth")
+    ]
+
+    def start_box(self, space: StateSpace) -> Box:
+        """Where starts and goals are drawn; a free dimension spans the state space."""
+        box, bounds = self.box(), space.bounds
+        return Box(
+            np.where(np.isfinite(box.lower), box.lower, bounds.lower),
+            np.where(np.isfinite(box.upper), box.upper, bounds.upper),
+        )
+
+    @property
+    def goal_offsets(self) -> Box | None:
+        """The goal region relative to its middle; None for a point."""
+        if self.goal is None:
+            return None
+        reach = np.array([np.inf if side is None else side for side in self.goal])
+        return Box(-reach, reach)
+
+
+@dataclass(frozen=True, config=STRICT)
+class TruthSettings:
+    """The true constraint: the union of its boxes, one of the hypotheses, or nothing at all."""
+
+    name: Annotated[Word, about(f"what tables call it; `{NO_TRUTH}` where nothing is forbidden")]
+    boxes: Annotated[
+        tuple[Region, ...],
+        about("boxes whose union is forbidden, null for a free dimension", "of the state"),
+    ]
+    cell: Annotated[Index | None, about("or one of the hypotheses, by its number")]
+
+    @property
+    def label(self) -> str:
+        """The name, with the number of the hypothesis."""
+        return self.name if self.cell is None else f"{self.name}_{self.cell}"
+
+
+@dataclass(frozen=True, config=STRICT)
+class GridSettings:
+    """The cells of the tabular model."""
+
+    shape: Annotated[Shape, about("cells of the tabular model along each dimension")]
+    offset: Annotated[
+        tuple[Share, ...] | None,
+        about(
+            "shift of the cells along each dimension, periodic ones only; null is none",
+            "share of a cell",
+        ),
+    ]
+
+
+@dataclass(frozen=True, config=STRICT)
+class TransitionSettings:
+    """How transitions of the tabular model start."""
+
+    samples: Annotated[
+        Count, about("start points in a cell along each dimension; 1 is the cell's centre alone")
+    ]
+
+
+@dataclass(frozen=True, config=STRICT)
+class HypothesesSettings:
+    """Cells of a regular grid (None leaves a dimension free), then listed boxes."""
+
+    shape: Annotated[
+        Annotated[tuple[Count | None, ...], Field(min_length=1)] | None,
+        about(
+            "hypotheses as cells along each dimension, null for a dimension left free; null alone "
+            "is none"
+        ),
+    ]
+    boxes: Annotated[
+        tuple[Region, ...],
+        about("more hypotheses, null for a free dimension", "of the state"),
+    ]
+
+    def regions(self, space: StateSpace) -> ConstraintSet:
+        """All hypotheses, in the order in which tables number them."""
+        boxes = [region.box() for region in self.boxes]
+        if self.shape is None:
+            return ConstraintSet.from_boxes(space, boxes)
+        cells = ConstraintSet.from_grid(space, self.shape)
+        return cells.joined(ConstraintSet.from_boxes(space, boxes)) if boxes else cells
+
+
+@dataclass(frozen=True, config=STRICT)
+class DemonstrationSettings:
+    """How demonstrations are generated."""
+
+    pairs: Annotated[Count, about("start and goal pairs that are tried")]
+    keep: Annotated[Count, about("the first survivors that make the study")]
+    dt: Annotated[Positive, about("time step; it divides the horizon", "s")]
+    goal_tolerance: Annotated[
+        Positive, about("largest final distance to the goal, Euclidean", "of the state")
+    ]
+    restarts: Annotated[Count, about("random first controls that are tried for a pair")]
+    iterations: Annotated[Count, about("iterations of iLQR from each of them")]
+    goal_weight: Annotated[Positive, about("price of the squared final distance to the goal")]
+    hold: Annotated[Positive, about("the random first controls change this often", "s")]
+    clip: Annotated[
+        Flag, about("whether the demonstrator is limited to the control range of the system")
+    ]
+    wind: Annotated[
+        Flag,
+        about("any number of turns may lead to a goal; false: only the way of at most half a turn"),
+    ]
+
+
+@dataclass(frozen=True, config=STRICT)
+class SafetySettings:
+    """How the safe set is computed, and how the safety filter uses it."""
+
+    method: Annotated[
+        Literal["equation", "escapes"],
+        about("`equation` solves (9); `escapes` takes the best constant control, on coarse grids"),
+    ]
+    shape: Annotated[Shape, about("cells of the grid that the safe set is computed on")]
+    margin: Annotated[
+        NotNegative | None,
+        about(
+            "V below which the safe control acts; null derives it from dt and this grid",
+            "of the state",
+        ),
+    ]
+    width: Annotated[
+        NotNegative,
+        about("width of the blend above the margin; 0 switches at once", "of the state"),
+    ]
+
+
+@dataclass(frozen=True, config=STRICT)
+class InferenceSettings:
+    """Beliefs before any demonstration."""
+
+    prior: Annotated[Probability, about("probability that there is no constraint at all")]
+
+
+@dataclass(frozen=True, config=STRICT)
+class RankSettings:
+    """Ranks of the truth over random subsets of the demonstrations."""
+
+    demonstrations: Annotated[
+        Count, about("ranks of the truth after 1 up to this many demonstrations")
+    ]
+    subsets: Annotated[Count, about("random subsets of each size")]
+    top: Annotated[Count, about("the share of subsets that put the truth among this many")]
+
+
+@dataclass(frozen=True, config=STRICT)
+class CalibrationSettings:
+    """Are beliefs as often right as they are probable? For truth=cell and truth=none."""
+
+    sets: Annotated[
+        CountOrNone,
+        about("sets of demonstrations drawn from the tabular model; 0 asks nothing"),
+    ]
+    demonstrations: Annotated[Shape, about("so many demonstrations of each set are seen")]

@@ -1,0 +1,125 @@
+"""All that decides the result of a point, and what it shares with the other commands."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Annotated
+
+from pydantic import BeforeValidator
+from pydantic.dataclasses import dataclass
+
+from experiments.config.settings.kinds import (
+    STRICT,
+    Count,
+    Positive,
+    Seed,
+    about,
+    one_or_list,
+)
+from experiments.config.settings.parts import (
+    CalibrationSettings,
+    DemonstrationSettings,
+    GridSettings,
+    HypothesesSettings,
+    InferenceSettings,
+    RankSettings,
+    SafetySettings,
+    Shape,
+    TaskSettings,
+    TransitionSettings,
+    TruthSettings,
+)
+from experiments.config.settings.system import SystemSettings, read_system
+from mlci.grids import Grid
+from mlci.regions import ConstraintSet
+from mlci.systems import System
+
+
+@dataclass(frozen=True, config=STRICT)
+class SubjectSettings:
+    """A system, what it can do, and the hypotheses about it."""
+
+    system: Annotated[
+        SystemSettings,
+        BeforeValidator(read_system),
+        about("`_target_` names a class, whose constructor takes the other keys"),
+    ]
+    actions: Annotated[
+        one_or_list(Count, Shape),  # type: ignore[valid-type]
+        about("actions, evenly spaced over the control box; a list gives a number each control"),
+    ]
+    hypotheses: HypothesesSettings
+
+    @cached_property
+    def model(self) -> System:
+        """The system, built."""
+        return self.system.build()
+
+    @cached_property
+    def candidates(self) -> ConstraintSet:
+        """The hypotheses."""
+        return self.hypotheses.regions(self.model.space)
+
+    @property
+    def action_counts(self) -> tuple[int, ...]:
+        """(m,) number of actions along each control."""
+        if isinstance(self.actions, int):
+            return (self.actions,) * self.model.control_box.dimension
+        return self.actions
+
+
+@dataclass(frozen=True, config=STRICT)
+class ModelSettings(SubjectSettings):
+    """The tabular model of a system and the hypotheses about it."""
+
+    grid: GridSettings
+    dt: Annotated[Positive, about("time step of the tabular model; it divides the horizon", "s")]
+    transition: TransitionSettings
+    temperature: Annotated[
+        Positive, about("of the maximum entropy model: larger is closer to random")
+    ]
+    inference: InferenceSettings
+
+    @cached_property
+    def cells(self) -> Grid:
+        """The grid of the tabular model."""
+        return Grid(self.model.space, self.grid.shape, self.grid.offset or ())
+
+
+@dataclass(frozen=True, config=STRICT)
+class Settings(ModelSettings):
+    """All that decides the result of one point, and nothing else."""
+
+    tasks: TaskSettings
+    truth: TruthSettings
+    horizon: Annotated[Positive, about("duration of a task", "s")]
+    demonstrations: DemonstrationSettings
+    safety: SafetySettings
+    ranks: RankSettings
+    calibration: CalibrationSettings
+    rollouts: Annotated[
+        Count, about("sampled policies executed on the true dynamics for each demonstration")
+    ]
+    seed: Annotated[Seed, about("of all that is random")]
+
+    @cached_property
+    def constraint(self) -> ConstraintSet:
+        """The true constraint; a set of no regions where there is none."""
+        boxes = [region.box() for region in self.truth.boxes]
+        if self.truth.cell is not None:
+            boxes = [self.candidates.box(self.truth.cell)]
+        return ConstraintSet.from_boxes(self.model.space, boxes)
+
+    @property
+    def columns(self) -> dict[str, str | int | float]:
+        """The values that open every row of this point's tables."""
+        actions = self.actions
+        return {
+            "truth": self.truth.label,
+            "cells": math.prod(self.grid.shape),
+            "actions": actions if isinstance(actions, int) else "x".join(map(str, actions)),
+            "dt": self.dt,
+            "samples": self.transition.samples,
+            "seed": self.seed,
+        }

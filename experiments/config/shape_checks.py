@@ -1,0 +1,123 @@
+"""What does not match the system: its dimensions, the bounds of its states, its controls.
+
+Each check yields a line for each fault: the key, the value and the way out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from experiments.config.settings import (
+    AdviceSettings,
+    GridSettings,
+    ModelSettings,
+    RecordedSettings,
+    Region,
+    Settings,
+    SubjectSettings,
+    TaskSettings,
+)
+from mlci.spaces import StateSpace
+
+
+def shape_problems(settings: ModelSettings) -> Iterator[str]:
+    """A grid, actions or hypotheses that do not match the system."""
+    yield from _grid_problems(settings.grid, settings.model.space)
+    yield from _subject_problems(settings)
+
+
+def point_shape_problems(settings: Settings) -> Iterator[str]:
+    """A safe set's grid, tasks or a truth that do not match the system."""
+    space = settings.model.space
+    yield from _length_problems("safety.shape", settings.safety.shape, space)
+    yield from _task_region_problems(settings.tasks, space)
+    for i, region in enumerate(settings.truth.boxes):
+        yield from _region_problems(f"truth.boxes[{i}]", region, space)
+
+
+def advice_shape_problems(settings: AdviceSettings) -> Iterator[str]:
+    """Grids, actions, hypotheses or tasks that do not match the system."""
+    space = settings.model.space
+    yield from _grid_problems(settings.grid, space)
+    for i, shape in enumerate(settings.grids or ()):
+        yield from _length_problems(f"grids[{i}]", shape, space)
+    yield from _subject_problems(settings)
+    yield from _task_region_problems(settings.tasks, space)
+
+
+def recorded_shape_problems(settings: RecordedSettings) -> Iterator[str]:
+    """A start or goal that does not match the system."""
+    space = settings.model.space
+    if settings.start is not None:
+        yield from _length_problems("start", settings.start, space)
+    if settings.goal is not None:
+        yield from _region_problems("goal", settings.goal, space, point=True)
+
+
+def _grid_problems(grid: GridSettings, space: StateSpace) -> Iterator[str]:
+    """Cells that do not match the state space."""
+    yield from _length_problems("grid.shape", grid.shape, space)
+    yield from _offset_problems(grid.offset, space)
+
+
+def _subject_problems(settings: SubjectSettings) -> Iterator[str]:
+    """Actions and hypotheses that do not match the system."""
+    space, controls = settings.model.space, settings.model.control_box.dimension
+    if settings.hypotheses.shape is not None:
+        yield from _length_problems("hypotheses.shape", settings.hypotheses.shape, space)
+    if not isinstance(settings.actions, int) and len(settings.actions) != controls:
+        yield f"actions: {list(settings.actions)} must be one number, or a list of {controls}"
+    for i, region in enumerate(settings.hypotheses.boxes):
+        yield from _region_problems(f"hypotheses.boxes[{i}]", region, space)
+    if settings.hypotheses.shape is None and not settings.hypotheses.boxes:
+        yield "hypotheses: no shape and no boxes; give a shape, for a grid of cells, or boxes"
+
+
+def _offset_problems(offset: tuple[float, ...] | None, space: StateSpace) -> Iterator[str]:
+    """Cells can be shifted in periodic dimensions only."""
+    if offset is None:
+        return
+    yield from _length_problems("grid.offset", offset, space)
+    for share, periodic, name in zip(offset, space.periodic, space.names, strict=False):
+        if share and not periodic:
+            yield f"grid.offset: {list(offset)} shifts {name}, which has ends; give it 0"
+
+
+def _task_region_problems(tasks: TaskSettings, space: StateSpace) -> Iterator[str]:
+    """A box of tasks, or the reach of their goals, that does not fit the state space."""
+    yield from _region_problems("tasks", tasks, space, point=True)
+    if tasks.goal is not None:
+        yield from _length_problems("tasks.goal", tasks.goal, space)
+
+
+def _length_problems(key: str, entries: tuple[Any, ...], space: StateSpace) -> Iterator[str]:
+    """A list must have an entry for each dimension of the state space."""
+    if len(entries) != space.dimension:
+        names = ", ".join(space.names)
+        yield f"{key}: {list(entries)} must have {space.dimension} entries, one each for {names}"
+
+
+def _region_problems(
+    key: str, region: Region, space: StateSpace, point: bool = False
+) -> Iterator[str]:
+    """A box must match the state space, be ordered and lie inside; some may be a `point`."""
+    if len(region.lower) != space.dimension or len(region.upper) != space.dimension:
+        yield from _length_problems(f"{key}.lower", region.lower, space)
+        yield from _length_problems(f"{key}.upper", region.upper, space)
+        return
+    for d, (low, high) in enumerate(zip(region.lower, region.upper, strict=True)):
+        name, first, last = space.names[d], space.bounds.lower[d], space.bounds.upper[d]
+        if low is None and high is None:
+            continue
+        if low is None or high is None:
+            yield f"{key}: {name} has one side only; give both ends, or null twice to leave it free"
+        elif low > high or (low == high and not point):
+            yield f"{key}: {name} goes from {low} to {high}; lower must be below upper"
+        elif space.periodic[d] and high - low > (last - first) * (1 + 1e-12):
+            yield f"{key}: {name} from {low:.6g} to {high:.6g} is over a whole turn; use null twice"
+        elif not space.periodic[d] and (low < first or high > last):
+            yield (
+                f"{key}: {name} from {low:.6g} to {high:.6g} leaves the state space "
+                f"[{first:.6g}, {last:.6g}]; move it inside, or choose another {key.split('.')[0]}"
+            )

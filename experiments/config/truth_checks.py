@@ -1,0 +1,93 @@
+"""What is wrong with the truth, the safe set that keeps out of it, and its tasks.
+
+Each check yields a line for each fault: the key, the value and the way out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from experiments.config.settings import NO_TRUTH, Settings
+from mlci.grids import Grid
+from mlci.spaces import Box
+
+_MOST_VALUES = 100_000_000  # of a safe set's grid: about 1 GB for each of its arrays
+
+
+def truth_problems(settings: Settings) -> Iterator[str]:
+    """A truth that is given twice or not at all, and what needs a truth, or none."""
+    truth, calibration = settings.truth, settings.calibration
+    if settings.tasks.crossing and truth.name == NO_TRUTH:
+        yield "tasks.crossing: true, but no truth is there to cross; set it to false"
+    nothing = not truth.boxes and truth.cell is None
+    if nothing and truth.name != NO_TRUTH:
+        yield (
+            "truth.boxes: [] is empty; give at least one box, with lower and upper, or a cell, or "
+            f"choose truth={NO_TRUTH}"
+        )
+    if truth.name == NO_TRUTH and not nothing:
+        yield f"truth.name: {NO_TRUTH} means that nothing is forbidden; take another name"
+    if truth.cell is not None and truth.boxes:
+        yield f"truth.cell: {truth.cell} and {len(truth.boxes)} boxes are given; keep one of them"
+    if calibration.sets and truth.boxes:
+        yield (
+            f"calibration.sets: {calibration.sets}, but the prior knows no such truth; take "
+            "truth=none or truth=cell, or 0 sets"
+        )
+    for i, region in enumerate(truth.boxes):
+        if all(side is None for side in region.lower):
+            yield f"truth.boxes[{i}]: forbids every state; give ends to at least one dimension"
+
+
+def hypothesis_problems(settings: Settings) -> Iterator[str]:
+    """A truth that no hypothesis stands for."""
+    count = len(settings.candidates)
+    if settings.truth.cell is not None and settings.truth.cell >= count:
+        yield (
+            f"truth.cell: {settings.truth.cell} is not the number of a hypothesis; there are "
+            f"{count}, from 0 to {count - 1}"
+        )
+        return
+    constraint = settings.constraint
+    if len(constraint) and not np.any(settings.candidates.inside(constraint)):
+        yield (
+            f"truth: {settings.truth.name} covers no hypothesis entirely, so none can be ranked as "
+            "the truth; choose boxes that hold a whole cell of hypotheses.shape, or refine that"
+        )
+
+
+def safe_set_problems(settings: Settings) -> Iterator[str]:
+    """A safe set's grid that is too fine to hold or too coarse for the truth, and a wide border."""
+    safety, space = settings.safety, settings.model.space
+    widest = float(np.max(space.bounds.widths))
+    for key, value in (("margin", safety.margin), ("width", safety.width)):
+        if value is not None and value > widest:
+            yield (
+                f"safety.{key}: {value:g} is more than the state space is wide, {widest:.6g}; "
+                "lower it"
+            )
+    if math.prod(safety.shape) > _MOST_VALUES:
+        yield f"safety.shape: {list(safety.shape)} makes too many values; use fewer"
+    elif safety.method == "equation":
+        grid = Grid(space, safety.shape)
+        for i in range(len(settings.constraint)):
+            if names := " and ".join(_missed(settings.constraint.box(i), grid)):
+                yield (
+                    f"safety.shape: {list(safety.shape)} has no cell centre inside the truth's box "
+                    f"{i} along {names}; use more cells"
+                )
+
+
+def _missed(box: Box, grid: Grid) -> Iterator[str]:
+    """The dimensions along which no cell centre of a grid lies inside a box."""
+    space, bounds = grid.space, grid.space.bounds
+    lower = np.where(np.isfinite(box.lower), box.lower, bounds.lower)
+    middle = (lower + np.where(np.isfinite(box.upper), box.upper, bounds.upper)) / 2
+    for d, centres in enumerate(grid.axes):
+        states = np.tile(middle, (len(centres), 1))
+        states[:, d] = centres
+        if not np.any(space.signed_distance(states, box) < 0):
+            yield space.names[d]
