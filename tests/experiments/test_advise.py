@@ -159,7 +159,7 @@ def test_each_rule_of_the_recommendation_gives_way_to_the_one_before() -> None:
         (["remedy=0"], "remedy: 0 must be at least 1"),
         (["budget=50"], "budget: 50 states hold none of the grids; raise it, or set grids"),
         (["grids=[[20,20],[20]]"], "grids[1]: [20] must have 2 entries, one each for angle"),
-        (["grids=[[20,0]]"], "grids: [[20, 0]] must be at least 1"),
+        (["grids=[[20,0]]"], "grids[0][1]: 0 must be at least 1"),
         (["+dt=0.2"], "dt: unknown key; did you mean dts?"),
         (["actions=[9,9]"], "actions: [9, 9] must be one number, or a list of 1"),
         (["tasks.upper=[1.0]"], "tasks.upper: [1.0] must have 2 entries"),
