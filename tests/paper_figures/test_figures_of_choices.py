@@ -41,8 +41,12 @@ MEAN = ["mean", "low", "high"]
 
 def bars(axes: Axes, label: str) -> np.ndarray:
     """Marks (x, y) and ends (low, high) of the error bars of a label, in the axes' first sense."""
+    return marks_and_ends(bars_of(axes, label))
+
+
+def bars_of(axes: Axes, label: str) -> ErrorbarContainer:
     (container,) = (each for each in axes.containers if each.get_label() == label)
-    return marks_and_ends(container)
+    return container
 
 
 def marks_and_ends(container: ErrorbarContainer) -> np.ndarray:
@@ -90,7 +94,19 @@ def test_choice_effects_draw_each_case_with_its_interval(drawn: Drawn) -> None:
             np.testing.assert_allclose(dots[:, [0, 2, 3]], expected)
             np.testing.assert_array_equal(np.round(dots[:, 1]), [line for *_, line in of_series])
             checked += len(expected)
+        for axes, name in zip(figure.axes, ("median", "top", "error", "distance"), strict=True):
+            colour = bars_of(axes, label)[0].get_color()
+            dotted = [line for line in axes.lines if line.get_linestyle() == ":"]
+            (x,) = {line.get_xdata()[0] for line in dotted if line.get_color() == colour}
+            default = bars(axes, label)[np.round(bars(axes, label)[:, 1]) == 0]
+            assert x == default[0, 0], name
     assert checked == 4 * 7
+    assert [(axes.get_title(), axes.get_xlabel()) for axes in figure.axes] == [
+        ("median rank", "rank of truth"),
+        ("truth in the top 5", "subsets [%]"),
+        ("final-state error", "error [of the ranges]"),
+        ("violation distance", "distance [regions]"),
+    ]
     styles = {each.get_label(): each[0] for each in rank.containers}
     first = styles["100 cells, $\\Delta t$ = 0.25 s"]
     assert (first.get_marker(), to_hex(first.get_color())) == (CELL_MARKS[100], CELL_COLOURS[100])
@@ -102,7 +118,8 @@ def test_choice_effects_say_every_number() -> None:
     lines = choice_effects.facts(**tables).splitlines()
     row = choice_effects.case_rows(**tables).iloc[-1]
     assert lines[-1].startswith("  temperature: 2, 400 cells, dt 0.5 s: ")
-    for name, factor in (("rank", 1), ("top", 100), ("final_state_error", 1)):
+    numbers = {"rank": 1, "top": 100, "final_state_error": 1, "violation_distance": 1}
+    for name, factor in numbers.items():
         values = [f"{factor * row[name + end]:.3g}" for end in LIMITS]
         assert "{} ({} to {})".format(*values) in lines[-1]
     assert len([line for line in lines if line.startswith("  ")]) == len(tables["cases"])
@@ -131,7 +148,7 @@ def test_start_points_draw_each_setting_with_its_interval(drawn: Drawn) -> None:
             (curve, [f"share_top_5{end}" for end in LIMITS], 100),
         ]
         for axes, (table, columns, factor) in zip(row, sources, strict=True):
-            assert axes.get_title().startswith(truth.upper())
+            assert axes.get_title().startswith(f"{truth.upper()}: ")
             for cells, samples in ((100, 1), (100, 3), (400, 1)):
                 points = "points" if samples > 1 else "point"
                 dots = bars(axes, f"{cells} cells, {samples} start {points} a dimension")
@@ -140,8 +157,30 @@ def test_start_points_draw_each_setting_with_its_interval(drawn: Drawn) -> None:
                 )
                 np.testing.assert_allclose(dots[:, 1:], factor * rows[columns].to_numpy())
                 np.testing.assert_allclose(dots[:, 0], rows["dt"], rtol=0.05)
-    said = start_points.facts(**tables).splitlines()
-    assert len([line for line in said if line.startswith("  C")]) == 12
+    titles = [axes.get_title().removeprefix("C1: ") for axes in panels[0]]
+    assert titles == [
+        *("reachable goals [%]", "final-state error", "violation distance"),
+        *("rank of truth", "in top 5 [%]"),
+    ]
+    assert {axes.get_xlabel() for axes in panels[-1]} == {"$\\Delta t$ [s]"}
+
+
+def test_start_points_say_every_number() -> None:
+    tables = start_point_tables()
+    lines = start_points.facts(**tables).splitlines()
+    assert len([line for line in lines if line.startswith("  C")]) == 12
+    key = "truth == 'c2' and cells == 100 and samples == 3 and dt == 0.5"
+    means = tables["measures"].query(key).set_index("measure")["mean"]
+    (row,) = tables["rank_curve"].query(f"{key} and demonstrations == 9").to_dict("records")
+    rank = [row[f"median{end}"] for end in LIMITS]
+    top = [100 * row[f"share_top_5{end}"] for end in LIMITS]
+    assert (
+        "  C2, 100 cells, 3 start points a dimension, dt 0.5 s: "
+        f"{100 * means['reachable']:.0f} % of the goals reachable, final-state error "
+        f"{means['final_state_error']:.3g}, violation distance {means['violation_distance']:.3g}, "
+        "median rank {:.3g} ({:.3g} to {:.3g}), ".format(*rank)
+        + "in the top 5 {:.0f} % ({:.0f} to {:.0f})".format(*top)
+    ) in lines
 
 
 def test_start_points_need_several_samples_and_nothing_else() -> None:
@@ -172,8 +211,10 @@ def test_calibration_draws_what_is_probable_and_of_enough_beliefs(drawn: Drawn) 
                 dots = bars(axes, label)
                 columns = ["predicted", "observed", "low", "high"]
                 np.testing.assert_allclose(dots, 100 * bins[columns].to_numpy())
-                (line,) = (each[0] for each in axes.containers if each.get_label() == label)
-                assert line.get_marker() == mark
+                assert bars_of(axes, label)[0].get_marker() == mark
+        assert row[0].get_ylabel().endswith("\n\nright [%]")
+        assert source in row[0].get_ylabel().replace("tabular model", "model")
+    assert {axes.get_xlabel() for axes in panels[-1]} == {"probability [%]"}
 
 
 def test_calibration_says_what_is_right() -> None:
@@ -254,6 +295,8 @@ def test_success_curves_are_the_shares_of_the_default_case(
                     assert (of_number.min(), of_number.max()) == pytest.approx(ends)
             (paper,) = (line for line in axes.lines if len(line.get_xdata()) == 2)
             assert paper.get_xdata() == [5, 5]
+            assert axes.get_xlabel() == "demonstrations"
+            assert axes.get_ylabel() == "sets of demonstrations [%]"
 
 
 def test_success_shows_the_first_demonstrations_and_the_best(
@@ -373,6 +416,8 @@ def test_success_cases_draws_every_share_over_the_evidence(
     axes, styles = figure.axes[-1], signs(figure)
     lines = [line for line in axes.lines if len(line.get_xdata()) > 2]
     assert len(lines) == len(SUCCESS_CASES) * len(KINDS)
+    assert axes.get_xlabel() == "evidence\n[violations expected]"
+    assert axes.get_ylabel() == "sets [%]"
     measures = tables["measures"].query("measure == 'truth_probability'")
     for crossing, words in KINDS.items():
         of_kind = [line for line in lines if to_hex(line.get_color()) == styles[words][0]]

@@ -136,6 +136,7 @@ def test_rank_curves_are_the_medians_bands_and_shares_of_the_table(
         left, right = grid[dts.index(dt), 2 * truths.index(truth) :][:2]
         assert left.get_title(loc="left") == f"{truth.upper()}, $\\Delta t$ = {dt:g} s"
         assert left.get_yscale() == "log"
+        assert (left.get_ylabel(), right.get_ylabel()) == ("rank of truth", "in top 5 [%]")
         for place, (cells, rows) in enumerate(part.groupby("cells")):
             sides = [
                 (left, rows["median"], rows["q25"], rows["q75"]),
@@ -151,13 +152,15 @@ def test_rank_curves_are_the_medians_bands_and_shares_of_the_table(
                 for x, least, most in zip(rows["demonstrations"], low, high, strict=True):
                     at = edges[edges[:, 0] == x, 1]
                     assert (at.min(), at.max()) == pytest.approx((least, most))
-    said = rank_curve.facts(table)
+    assert {axes.get_xlabel() for axes in grid[-1]} == {"demonstrations"}
+    said = f"{rank_curve.facts(table)}\n"
     at = min(9, wanted["demonstrations"].max())
     for row in wanted[wanted["demonstrations"] == at].itertuples():
         assert (
             f"{row.truth.upper()}, {row.cells} cells, dt {row.dt:g} s: median rank "
             f"{row.median:.3g} ({row.median_low:.3g} to {row.median_high:.3g}), in the top 5 "
-            f"{100 * row.share_top_5:.0f} % ("
+            f"{100 * row.share_top_5:.0f} % ({100 * row.share_top_5_low:.0f} to "
+            f"{100 * row.share_top_5_high:.0f})\n"
         ) in said
 
 
@@ -255,6 +258,26 @@ def test_overview_is_one_run_from_demonstrations_to_ranks(
     ranking, visits = of_c1["example_ranking"], of_c1["example_cells"]
     count = of_c1["example_paths"]["demonstration"].nunique()
     assert len(shown.lines) == min(15, count) + 1  # and the trial once more
+    trial = visits["trial"].iloc[0]
+    path = (
+        of_c1["example_paths"]
+        .query(f"demonstration == {trial}")[["angle", "speed"]]
+        .to_numpy(copy=True)
+    )
+    path[:, 0] %= 2 * np.pi
+    thick = shown.lines[-1].get_xydata()
+    np.testing.assert_allclose(thick[~np.isnan(thick).any(axis=1)], path)
+    ends = [line.get_xydata()[0] for line in chances.lines]
+    np.testing.assert_allclose(ends, path[[0, -1]])
+    assert [line.get_marker() for line in chances.lines] == ["o", "s"]
+    for axes in figure.axes[:4]:
+        assert axes.get_xlabel() == "angle [rad]"
+    assert [axes.get_ylabel() for axes in figure.axes[:4]] == ["speed [rad/s]"] * 2 + [""] * 2
+    bars = [(bar.get_xlabel(), bar.get_xticklabels()) for bar in figure.axes[4:]]
+    assert [(label, [tick.get_text() for tick in ticks]) for label, ticks in bars] == [
+        ("$\\Phi_i$ of one trial", ["0", "0.5", "1"]),
+        ("gain $L_i$ [nat]", ["0", "1.5", "6"]),
+    ]
     (coloured,) = boxes(chances)
     np.testing.assert_allclose(coloured.get_array(), ranking["unconstrained"])
     np.testing.assert_allclose(extent(coloured), corners(ranking))
@@ -291,7 +314,11 @@ def test_moves_past_a_whole_turn_stay_short(drawn: Drawn) -> None:
 def test_hypothesis_map_shows_what_the_table_says(drawn: Drawn, tables_for: TablesFor) -> None:
     tables, figure = tables_for(hypothesis_map), drawn(hypothesis_map)
     ranking = tables["example_ranking"]
-    axes = figure.axes[0]
+    axes, bar = figure.axes
+    assert bar.get_ylabel() == "likelihood gain $L_i$ [nat]"
+    np.testing.assert_allclose(bar.get_yticks() ** 2, [0, 6 / 16, 6 / 4, 6 * 9 / 16, 6])
+    ticks = [float(text.get_text()) for text in bar.get_yticklabels()]
+    np.testing.assert_allclose(ticks, bar.get_yticks() ** 2, rtol=0.05)
     feasible, violated = boxes(axes)
     kept = ranking[ranking["feasible"]]
     np.testing.assert_allclose(np.square(feasible.get_array()), kept["gain"], rtol=1e-12)

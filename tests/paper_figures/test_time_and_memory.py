@@ -16,6 +16,7 @@ from paper_figures import time_and_memory
 
 def test_the_figure_shows_the_table() -> None:
     left, right = time_and_memory.draw(scale_rows()).axes
+    assert (left.get_ylabel(), right.get_ylabel()) == ("processor time [s]", "memory [MB]")
     table = scale_rows()
     for axes, columns in ((left, ["discretise_s", "infer_s"]), (right, ["peak_mb"])):
         lines = [line for line in axes.lines if line.get_marker() != "None"]
@@ -29,6 +30,7 @@ def test_the_figure_shows_the_table() -> None:
         for curve, values in zip(curves, expected, strict=True):
             np.testing.assert_allclose(curve, values)
         assert axes.get_xscale() == axes.get_yscale() == "log"
+        assert axes.get_xlabel() == "states"
         assert [line.get_markerfacecolor() == "white" for line in lines] == [False] * len(
             columns
         ) + [True] * len(columns)
