@@ -19,7 +19,7 @@ _STOPPED = 130  # the exit status after Ctrl-C
 
 
 def main() -> int:
-    """Run the command line; returns the exit status."""
+    """Run the command line; returns 1 if a study that it names makes no figure, else 0."""
     parser = argparse.ArgumentParser(prog="paper_figures", description=__doc__)
     parser.add_argument("study", nargs="*", metavar="STUDY")
     parser.add_argument("--results", type=Path, help="folder of results", metavar="DIR")
@@ -35,14 +35,14 @@ def main() -> int:
     studies = options.study or sorted(path.parent.name for path in results.glob("*/tables"))
     if not studies:
         raise SystemExit(f"no study in {results}: run one first, python experiments/run.py -m ...")
+    is_complete = True
     for drawing in draw_studies([results / study for study in studies], options.jobs):
         for path in drawing.images:
             print(f"drawn: {path}", flush=True)
         if not drawing.images:
-            if options.study:
-                raise SystemExit(str(drawing))
-            print(f"nothing to draw: {drawing}")
-    return 0
+            print(f"nothing to draw: {drawing}", flush=True)
+            is_complete = False
+    return 0 if is_complete or not options.study else 1
 
 
 def _job_count(text: str) -> int:
