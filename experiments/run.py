@@ -25,7 +25,7 @@ from experiments.config.paths import CONF
 from experiments.config.read import ConfigError
 from experiments.sweep.planner import SweepFailed
 from experiments.sweep.plugins import register_plugins
-from experiments.sweep.worker import run_once
+from experiments.sweep.worker import run_single
 
 
 def main() -> int:
@@ -61,7 +61,7 @@ def _run_once(config: DictConfig) -> None:
     try:
         if any(HydraConfig.get().sweeper.get(key) for key in ("params", "cases")):
             raise ConfigError("experiment: this one describes a sweep; add -m to run it")
-        run_once(config)
+        run_single(config)
     except ConfigError as error:
         print(error, file=sys.stderr)
         raise SystemExit(REFUSED) from None

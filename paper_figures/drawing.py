@@ -14,6 +14,7 @@ from typing import Any
 import pandas as pd
 from joblib import Parallel, delayed
 
+from experiments.tracking.figure_notes import figure_note, read_note, sentence, write_note
 from experiments.tracking.files import replace_file
 from paper_figures import (
     calibration_diagram,
@@ -30,7 +31,6 @@ from paper_figures import (
     time_and_memory,
     violation_distance,
 )
-from paper_figures.figure_notes import figure_note, read_note, sentence, write_note
 from paper_figures.rows import Unsuited
 from paper_figures.style import save
 

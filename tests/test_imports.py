@@ -75,7 +75,6 @@ experiments.collate.reliability imports experiments.point.beliefs
 experiments.collate.reliability imports mlci.spaces
 experiments.collate.settings_of imports experiments.config.problems
 experiments.collate.settings_of imports experiments.config.settings
-experiments.lookback.freshness imports paper_figures.figure_notes
 """
 
 LONGEST = 300  # lines of a module

@@ -11,7 +11,7 @@ from experiments.config.command_line import quote_options
 from experiments.config.paths import CONF
 from experiments.config.read import plain_tree
 from experiments.config.settings import Settings
-from experiments.sweep import attempts
+from experiments.sweep import attempt
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.points import Point
 from experiments.tracking.trees import plain
@@ -48,7 +48,7 @@ def planned(settings: Settings, results: Path) -> Point:
 def computed(settings: Settings, results: Path, *, force: bool = False) -> Point:
     """The point of some settings, run here."""
     point = planned(settings, results)
-    attempts.run(point, settings, print, force=force)
+    attempt.run_here(point, settings, print, force=force)
     return point
 
 

@@ -6,9 +6,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from experiments.lookback.archive import KeptPoint, count_states
+from experiments.tracking import figure_notes
+from experiments.tracking.files import digest
 from experiments.tracking.points import State
 from experiments.tracking.study import Study
-from paper_figures import figure_notes as origin
 
 
 def point_concerns(points: Sequence[KeptPoint]) -> list[str]:
@@ -27,11 +28,11 @@ def table_concerns(study: Study, points: Sequence[KeptPoint]) -> list[str]:
     if collated is None:
         return ["not written yet", *point_concerns(points)]
     found = []
-    for name, digest in collated.tables.items():
+    for name, written in collated.tables.items():
         path = study.folder / "tables" / name
         if not path.exists():
             found.append(f"table {name} is missing")
-        elif origin.table_digest(path.read_bytes()) != digest:
+        elif digest(path.read_bytes()) != written:
             found.append(f"table {name} was changed after it was written")
     if set(collated.points) != set(study.points):
         found.append("they hold other points than the study's last sweep")
@@ -48,4 +49,4 @@ def table_concerns(study: Study, points: Sequence[KeptPoint]) -> list[str]:
 def figure_concerns(study: Study, points: Sequence[KeptPoint]) -> dict[str, list[str]]:
     """Why each figure of a study is not up to date, by its name; empty for one that is."""
     shared = point_concerns(points)
-    return {name: own + shared for name, own in origin.concerns(study.folder).items()}
+    return {name: own + shared for name, own in figure_notes.concerns(study.folder).items()}

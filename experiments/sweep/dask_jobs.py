@@ -36,7 +36,7 @@ class DaskLauncher(ClusterLauncher):
         self.scheduler = scheduler
         self.threads = threads or len(os.sched_getaffinity(0))
 
-    def _look(self) -> None:
+    def _check_installed(self) -> None:
         if find_spec("distributed") is None:
             raise ConfigError("hydra/launcher: dask needs pip install 'mlci[dask]'")
 
@@ -47,13 +47,13 @@ class DaskLauncher(ClusterLauncher):
         try:
             client = Client(self.scheduler, **local)
         except OSError as error:
-            told = f"hydra.launcher.scheduler: {self.scheduler} does not answer: {error}"
-            raise ConfigError(told) from None
-        running = folder / "running"
-        running.touch()
+            message = f"hydra.launcher.scheduler: {self.scheduler} does not answer: {error}"
+            raise ConfigError(message) from None
+        mark = folder / "running"
+        mark.touch()
         try:
             jobs = [
-                client.submit(_run_apart, i, list(share.items()), running, Path.cwd(), pure=False)
+                client.submit(_run_process, i, list(share.items()), mark, Path.cwd(), pure=False)
                 for i, share in enumerate(shares)
             ]
             print(f"{len(jobs)} Dask jobs: {folder}", flush=True)
@@ -61,7 +61,7 @@ class DaskLauncher(ClusterLauncher):
                 continue
             errors = [job.exception() if job.status == "error" else None for job in jobs]
         finally:
-            running.unlink()  # jobs end that run still
+            mark.unlink()  # jobs that still run end
             client.cancel(jobs)
             client.close()
         # KilledWorker, for one, whose own words are of no use.
@@ -69,13 +69,13 @@ class DaskLauncher(ClusterLauncher):
         return [f"Dask job {i}{end}" for i, end in enumerate(ends)]
 
 
-def _run_apart(index: int, share: Sequence[object], running: Path, folder: Path) -> None:
-    """In a worker: run a share in a process of its own."""
-    told = {"parent": os.getpid(), "while": str(running), "share": share, "workers": 1}
-    with open(running.parent / f"{index}.log", "a") as log:
+def _run_process(index: int, share: Sequence[object], mark: Path, folder: Path) -> None:
+    """In a worker: run a share in a process of its own, which ends when the mark is gone."""
+    order = {"parent": os.getpid(), "while_exists": str(mark), "share": share, "workers": 1}
+    with open(mark.parent / f"{index}.log", "a") as log:
         subprocess.run(
             [sys.executable, "-m", "experiments.sweep.cluster"],
-            input=json.dumps(told).encode(),
+            input=json.dumps(order).encode(),
             stdout=log,
             stderr=log,
             cwd=folder,

@@ -12,6 +12,8 @@ from experiments.sweep.planner import Planner
 from experiments.sweep.pool import PoolLauncher
 from experiments.sweep.slurm import SlurmLauncher
 
+_PLANNER = {"params": None, "cases": None, "case_settings": None, "ends": False}
+
 _SLURM = {
     "jobs": 100,  # of the array; the points are dealt to them
     "poll": 2.0,  # [s] between looks at the queue
@@ -36,11 +38,11 @@ _DASK = {
 
 @cache  # Hydra 1.4 wants them once
 def register_plugins() -> None:
-    """Make the sweeper and the launcher known to Hydra, however the project is installed."""
+    """Make the sweeper and the launchers known to Hydra, however the project is installed."""
     # Hydra 1.3 accepts plugins of the package `hydra_plugins` only; 1.4 has no such rule.
     Plugins.is_in_toplevel_plugins_module = staticmethod(lambda target: True)  # type: ignore[assignment, method-assign]
     for group, name, plugin, settings in (
-        ("hydra/sweeper", "planner", Planner, {"params": None, "cases": None, "ends": False}),
+        ("hydra/sweeper", "planner", Planner, _PLANNER),
         (
             "hydra/launcher",
             "pool",

@@ -22,11 +22,10 @@ from pebble import ProcessExpired, ProcessPool
 from tqdm import tqdm
 
 from experiments.config.read import plain_tree
+from experiments.sweep.plan import Job
 
 _BAR = "{percentage:3.0f}%|{bar:20}| {n}/{total} points, {elapsed} gone, {remaining} left{postfix}"
 _REFRESH = 0.5  # [s]
-
-Job = tuple[str, ...]
 
 
 class PoolLauncher(Launcher):
@@ -64,41 +63,41 @@ class PoolLauncher(Launcher):
         pool = ProcessPool(
             min(self.workers, len(jobs)),
             context=multiprocessing.get_context("spawn"),
-            initializer=_end_with,
+            initializer=_end_with_parent,
             initargs=[os.getpid()],
         )
         resource_tracker.ensure_running()  # its start would unblock the signal
         waiting, ended, failures = iter(jobs), 0, 0
-        now: dict[Future[Any], Job] = {}
+        running: dict[Future[Any], Job] = {}
         try:
             # Workers inherit the mask: Ctrl-C reaches this process only, which then stops them.
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 for job in islice(waiting, self.workers):
-                    now[pool.schedule(_work, [self.task, self._tree(job)])] = job
+                    running[pool.schedule(_work, [self.task, self._tree(job)])] = job
             finally:
                 signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-            while now:
-                self._show(bar, failures, now.values())
-                for future in wait(now, _REFRESH, FIRST_COMPLETED).done:
-                    job = now.pop(future)
+            while running:
+                self._update(bar, failures, running.values())
+                for future in wait(running, _REFRESH, FIRST_COMPLETED).done:
+                    job = running.pop(future)
                     returned = returns[job]
-                    if error := _error(future):
+                    if error := _error_of(future):
                         returned.status, returned.return_value = JobStatus.FAILED, error
-                        told = "FAILED"
+                        end = "FAILED"
                     else:
                         returned.status = JobStatus.COMPLETED
                         returned.return_value, seconds = future.result()
-                        told = f"{returned.return_value}, {seconds:.1f} s"
+                        end = f"{returned.return_value}, {seconds:.1f} s"
                     ended += 1
                     failures += error is not None
                     bar.update()
                     if not terminal:
-                        print(f"[{ended}/{len(jobs)}] {self._name(job)}: {told}", flush=True)
+                        print(f"[{ended}/{len(jobs)}] {self._name(job)}: {end}", flush=True)
                     if not (self.fail_fast and failures):
                         for job in islice(waiting, 1):
-                            now[pool.schedule(_work, [self.task, self._tree(job)])] = job
-            self._show(bar, failures, [])
+                            running[pool.schedule(_work, [self.task, self._tree(job)])] = job
+            self._update(bar, failures, [])
         finally:
             pool.stop()
             # The pool closes its locks before its workers; one that still starts would complain.
@@ -108,10 +107,10 @@ class PoolLauncher(Launcher):
             bar.close()
         return [returns[job] for job in jobs]
 
-    def _show(self, bar: tqdm[NoReturn], failures: int, now: Iterable[Job]) -> None:
-        """Failures so far, and what runs now, at the end of the bar."""
-        failed = [f"{failures} failed"] if failures else []
-        bar.set_postfix_str(" | ".join([*failed, *map(self._name, now)]))
+    def _update(self, bar: tqdm[NoReturn], failures: int, running: Iterable[Job]) -> None:
+        """Write the number of failures, and what runs now, at the end of the bar."""
+        count = [f"{failures} failed"] if failures else []
+        bar.set_postfix_str(" | ".join([*count, *map(self._name, running)]))
 
     def _name(self, job: Job) -> str:
         """What tells a job from the others."""
@@ -124,8 +123,8 @@ class PoolLauncher(Launcher):
         return plain_tree(self.context.config_loader.load_sweep_config(self.config, list(job)))
 
 
-def end_when(needless: Callable[[], bool]) -> None:
-    """End this process once nobody needs it."""
+def end_process_when(needless: Callable[[], bool]) -> None:
+    """End this process, from a thread, once it is not needed any more."""
 
     def watch() -> None:
         while not needless():
@@ -135,18 +134,18 @@ def end_when(needless: Callable[[], bool]) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _end_with(parent: int) -> None:
+def _end_with_parent(parent: int) -> None:
     """In a worker: end when the process that started it has ended, however that was killed."""
-    end_when(lambda: os.getppid() != parent)
+    end_process_when(lambda: os.getppid() != parent)
 
 
-def _error(future: Future[Any]) -> BaseException | None:
-    """What a job failed with."""
+def _error_of(future: Future[Any]) -> BaseException | None:
+    """The error of a job, or None."""
     error = future.exception()
     if isinstance(error, ProcessExpired):
         code = error.exitcode
-        how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with {code}"
-        return ChildProcessError(f"the worker process {how}")
+        end = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with {code}"
+        return ChildProcessError(f"the worker process {end}")
     return error
 
 

@@ -46,7 +46,7 @@ class SlurmLauncher(ClusterLauncher):
             if value is not None
         }
 
-    def _look(self) -> None:
+    def _check_installed(self) -> None:
         if find_spec("submitit") is None:
             raise ConfigError("hydra/launcher: slurm needs pip install 'mlci[slurm]'")
         if shutil.which("sbatch") is None:
@@ -57,10 +57,10 @@ class SlurmLauncher(ClusterLauncher):
         try:
             self._wait(ids)
         finally:
-            subprocess.run(["scancel", *{each.partition("_")[0] for each in ids}], check=False)
+            subprocess.run(["scancel", *{job_id.partition("_")[0] for job_id in ids}], check=False)
             for pickled in folder.glob("*.pkl"):
                 pickled.unlink()
-        return [f"SLURM job {each}" for each in ids]
+        return [f"SLURM job {job_id}" for job_id in ids]
 
     def _submit(self, shares: Sequence[Share], folder: Path) -> list[str]:
         """Hand the shares to SLURM; returns each one's job id, such as 12_3."""
@@ -86,7 +86,7 @@ class SlurmLauncher(ClusterLauncher):
                 queue = _queue()
                 if queue is None:
                     continue
-                absent = {each: 0 if each in queue else n + 1 for each, n in absent.items()}
+                absent = {job_id: 0 if job_id in queue else n + 1 for job_id, n in absent.items()}
                 ended = sum(n >= _PATIENCE for n in absent.values())
                 if bar.disable and ended > bar.n:
                     print(f"[{ended}/{len(ids)}] jobs ended", flush=True)
@@ -95,7 +95,7 @@ class SlurmLauncher(ClusterLauncher):
 
 
 def _queue() -> set[str] | None:
-    """Ids of this user's jobs that wait or run; None if SLURM does not answer now."""
+    """Ids of this user's jobs that wait or run; None if SLURM does not answer."""
     command = ["squeue", "--noheader", "--array", "--format=%i", f"--user={getpass.getuser()}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return set(done.stdout.split()) if done.returncode == 0 else None
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    return set(answer.stdout.split()) if answer.returncode == 0 else None

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from experiments.config.paths import results_folder
-from experiments.config.read import ConfigError, plain_tree, read_config
-from experiments.sweep import attempts as attempt
-from experiments.tracking.points import Point, State
-from experiments.tracking.trees import plain
+from experiments.config.read import ConfigError, plain_tree
+from experiments.sweep import attempt
+from experiments.sweep.plan import read_point
+from experiments.tracking.points import State
+
+_SWEEP_ONLY = ("only", "limit", "time_limit", "retries", "fail_fast", "mix_sources")
 
 
-def run_once(config: DictConfig) -> None:
+def run_single(config: DictConfig) -> None:
     """Run the point of a composed config, unless it is finished; prints its log either way.
 
     Raises:
         ConfigError: the config cannot be run.
     """
-    settings, study = read_config(plain_tree(config))
-    for option in ("only", "limit", "time_limit", "retries", "fail_fast", "mix_sources"):
+    point, settings, study = read_point(plain_tree(config))
+    for option in _SWEEP_ONLY:
         if getattr(study.sweep, option):
             raise ConfigError(f"sweep.{option}: only a sweep heeds it; add -m, or leave it out")
-    point = Point.planned(plain(settings), results_folder(study))
     if study.sweep.dry_run:
         print(f"{point.state()}: {point.folder}")
     elif point.is_done() and not study.sweep.force:
@@ -30,7 +30,7 @@ def run_once(config: DictConfig) -> None:
     else:
         if point.is_running():
             print(f"another process runs this point, and is waited for: {point.folder}")
-        attempt.run(point, settings, print, force=study.sweep.force)
+        attempt.run_here(point, settings, print, force=study.sweep.force)
         print(f"written: {point.folder}")
 
 
@@ -38,10 +38,9 @@ def run_task(config: DictConfig) -> State:
     """Run one point of a sweep, in a process of any launcher's.
 
     Returns:
-        State.DONE, or State.RUNNING if somebody else runs it.
+        State.DONE, or State.RUNNING if another process runs it.
     """
-    settings, study = read_config(plain_tree(config))
-    point = Point.planned(plain(settings), results_folder(study))
-    return attempt.run_apart(
+    point, settings, study = read_point(plain_tree(config))
+    return attempt.run_in_worker(
         point, settings, force=study.sweep.force, time_limit=study.sweep.time_limit
     )

@@ -22,7 +22,7 @@ from experiments.config.paths import CHECKOUT
 from paper_figures import state_space
 from paper_figures.__main__ import main
 from paper_figures.drawing import FIGURES, Drawing, draw_studies
-from paper_figures.figure_notes import concerns
+from experiments.tracking.figure_notes import concerns
 
 STATE_SPACE = {name: study_tables()[name] for name in state_space.TABLES}
 
@@ -91,8 +91,9 @@ def test_every_file_tells_its_origin(tmp_path: Path) -> None:
         "commits": ["c" * 40],
         "dirty": True,
         "started": ["2026-01-02T03:04:05+00:00", "2026-01-02T03:05:06+00:00"],
+        **{"seconds": 1.0, "peak_memory_mb": 1, "machines": [], "versions": [], "tables": {}},
     }
-    (tmp_path / "study.json").write_text(json.dumps({"collated": collated}))
+    (tmp_path / "study.json").write_text(json.dumps({"points": {}, "collated": collated}))
     before = png.read_bytes(), png.with_suffix(".pdf").read_bytes()
     texts = [Image.open(png).text, png.with_suffix(".txt").read_text()]
     draw(tmp_path)

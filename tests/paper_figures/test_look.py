@@ -16,7 +16,6 @@ from matplotlib.text import Text
 
 from paper_figures import hypothesis_map
 from paper_figures.drawing import FIGURES
-from paper_figures.figure_notes import SHARED
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, COLUMN, PAGE, save
 
 Drawn = Callable[[ModuleType], Figure]
@@ -29,13 +28,6 @@ def test_the_same_tables_make_the_same_bytes(tmp_path: Path, tables_for: TablesF
     for suffix in (".png", ".pdf"):
         one, two = ((tmp_path / name / f"map{suffix}").read_bytes() for name in ("one", "two"))
         assert one == two
-
-
-def test_figures_share_only_the_modules_that_their_freshness_depends_on() -> None:
-    for path in Path(hypothesis_map.__file__).parent.glob("*.py"):
-        if path.stem not in ("__main__", "drawing"):
-            imported = re.findall(r"^from paper_figures\.(\w+) import", path.read_text(), re.M)
-            assert set(imported) <= set(SHARED), path
 
 
 def test_colours_are_those_of_the_style() -> None:

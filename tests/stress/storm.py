@@ -29,7 +29,7 @@ from experiments.app import version_base
 from experiments.collate.join import collate
 from experiments.config.paths import CONF
 from experiments.config.read import plain_tree, read_config
-from experiments.sweep import attempts
+from experiments.sweep import attempt
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.points import Point
 from experiments.tracking.store import Store
@@ -39,14 +39,14 @@ KILLS = 20
 SEED = 2026
 # In each worker: whoever finishes a point says so, in a file that is only ever appended to.
 COUNTING = """
-from experiments.sweep import attempts as _attempt
+from experiments.sweep import attempt as _attempt
 
-def _counted(point, *arguments, _keep=_attempt._keep_result):
-    _keep(point, *arguments)
+def _counted(point, *arguments, _write=_attempt.write_result):
+    _write(point, *arguments)
     with open("finished.txt", "a") as file:
         file.write(point.identity + "\\n")
 
-_attempt._keep_result = _counted
+_attempt.write_result = _counted
 """
 
 
@@ -218,7 +218,7 @@ def collating(base: Path, limit: float = 5.0) -> None:
     seeded = [dataclasses.replace(settings, seed=seed) for seed in range(2000)]
     points = [Point.planned(plain(each), base / "collated") for each in seeded]
     for point, each in zip(points, seeded, strict=True):
-        attempts.run(point, each, lambda line: None)
+        attempt.run_here(point, each, lambda line: None)
     size = sum(path.stat().st_size for path in points[0].folder.iterdir())
     began = time.monotonic()
     collate(points, base / "collated" / "s")

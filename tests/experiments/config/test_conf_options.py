@@ -16,6 +16,7 @@ from experiments.app import version_base
 from experiments.config.command_line import quote_options
 from experiments.config.paths import CONF
 from experiments.config.read import plain_tree, read_config, read_recorded_config
+from experiments.sweep.combinations import read_cases
 from experiments.sweep.plugins import register_plugins
 
 register_plugins()
@@ -93,8 +94,8 @@ def test_every_experiment_is_valid_and_small_at_smoke_scale(
     sweeper = composed(experiment).hydra.sweeper
     axes = sweeper.params or {}
     points, parser = 0, OverridesParser.create()
-    for case in sweeper.cases or [[]]:
-        of_case = parser.parse_overrides([quote_options(word) for word in case])
+    for case in read_cases(sweeper.cases, sweeper.case_settings):
+        of_case = parser.parse_overrides([quote_options(word) for word in case.overrides])
         swept = [list(word.sweep_iterator()) for word in of_case if word.is_sweep_override()]
         points += math.prod(min(len(values), 2) for values in swept)
     for override in OverridesParser.create().parse_overrides([f"{k}={v}" for k, v in axes.items()]):

@@ -18,9 +18,9 @@ from tiny_point import computed, hopeless, planned
 from experiments import results
 from experiments.collate.join import collate
 from experiments.config.settings import Settings
+from experiments.tracking.figure_notes import figure_note, write_note
 from experiments.tracking.points import Point
 from experiments.tracking.study import write_plan
-from paper_figures.figure_notes import figure_note, write_note
 
 TABLES = (
     "attempts, dimensions, first, hypotheses, moves, paths, probabilities, ranks, regions, "

@@ -15,7 +15,7 @@ from tiny_point import composed, computed, hopeless, planned
 
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
-from experiments.sweep import attempts
+from experiments.sweep import attempt
 from experiments.tracking import environment
 from experiments.tracking.points import Point, State
 
@@ -52,12 +52,12 @@ def test_identity_is_pinned_whatever_the_spelling(overrides: list[str]) -> None:
 def test_state_follows_a_point(point: Point, settings: Settings) -> None:
     assert point.state() is State.MISSING
     assert not point.folder.exists()
-    attempts.run(point, settings, print)
+    attempt.run_here(point, settings, print)
     assert point.state() is State.DONE
     record = point.folder / "record.json"
     record.write_text(json.dumps(json.loads(record.read_text()) | {"source": "before an edit"}))
     assert point.state() is State.STALE
-    attempts.run(point, settings, print)
+    attempt.run_here(point, settings, print)
     assert point.state() is State.DONE
     assert point.record()["source"] == point.source
     assert point.record()["attempt"] == 2
@@ -78,20 +78,20 @@ def test_point_runs_as_long_as_its_holder_lives(point: Point, settings: Settings
         assert holder.stdout is not None
         assert holder.stdout.readline() == "held\n"
         assert point.state() is State.RUNNING
-        assert attempts.run_apart(point, settings) is State.RUNNING
+        assert attempt.run_in_worker(point, settings) is State.RUNNING
         holder.kill()
     deadline = time.monotonic() + 5
     while point.state() is State.RUNNING and time.monotonic() < deadline:
         time.sleep(0.01)
     assert point.state() is State.MISSING
-    assert attempts.bury(point, RuntimeError("killed"), 0)["reason"] == "died"
+    assert attempt.record_death(point, RuntimeError("killed"), 0)["reason"] == "died"
     assert point.state() is State.FAILED
 
 
 def test_point_that_somebody_finished_is_not_run_again(point: Point, settings: Settings) -> None:
-    attempts.run(point, settings, print)
+    attempt.run_here(point, settings, print)
     before = (point.folder / "record.json").read_bytes()
-    assert attempts.run_apart(point, settings) is State.DONE
+    assert attempt.run_in_worker(point, settings) is State.DONE
     assert (point.folder / "record.json").read_bytes() == before
 
 
@@ -100,7 +100,7 @@ def test_attempt_clears_what_a_killed_one_left(point: Point, settings: Settings)
     (point.folder / ".trials.csv-abc.part").touch()
     note = {"identity": point.identity, "attempt": 4}
     (point.folder / "attempt.json").write_text(json.dumps(note))
-    attempts.run(point, settings, print)
+    attempt.run_here(point, settings, print)
     assert point.record()["attempt"] == 5
     assert {path.name for path in point.folder.iterdir()} == {
         *("trials.csv", "ranks.csv", "hypotheses.csv", "first.csv", "summary.csv"),
@@ -123,7 +123,7 @@ def test_full_disk_is_a_failure_like_others(
 
     monkeypatch.setattr(os, "replace", refuse)
     with pytest.raises(OSError, match=r"No space left.*attempts.csv"):
-        attempts.run(point, settings, print)
+        attempt.run_here(point, settings, print)
     assert point.state() is State.MISSING  # there was no room to say more
     assert refused == ["attempts.csv", "failure.json"]
 
@@ -136,7 +136,7 @@ def summary_row(point: Point) -> dict[str, float | None]:
 
 
 def test_record_says_what_a_result_comes_from(point: Point, settings: Settings) -> None:
-    attempts.run(point, settings, print)
+    attempt.run_here(point, settings, print)
     record = point.record()
     assert record["config"]["grid"] == {"shape": [12, 8], "offset": None}
     assert record["summary"] == summary_row(point)

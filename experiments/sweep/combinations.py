@@ -1,0 +1,219 @@
+"""The overrides that make each point of a sweep: all swept values, with each case.
+
+A study's file gives them under `hydra.sweeper`:
+
+    params:                     # every combination of these values,
+      truth: c1,c2
+    cases:                      # with each of these in turn; the name goes to the table of cases
+      default: []
+      "temperature: 2": [temperature=2.0]
+      "one more cell":          # a list of lists: this case has settings of its own
+        - [dt=0.25, "grid.shape=[10,11]"]
+        - ["dt=0.25,0.5", "grid.shape=[20,21]"]
+    case_settings:              # in which each of the other cases runs
+      - [dt=0.25, "grid=100,400,900"]
+      - [dt=0.5, grid=400]
+
+Cases without names are a list of lists. Where an override has several values, so has its case.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
+from hydra.errors import HydraException
+from omegaconf import OmegaConf
+
+from experiments.config.command_line import quote_options
+from experiments.config.read import ConfigError
+from experiments.config.settings import SweepSettings
+
+_NOT_SWEPT = {
+    "scale": "a sweep has one scale; run it once for each",
+    "experiment": "a sweep over experiments would drop the values that each of them sweeps; "
+    "run them one after the other",
+    **dict.fromkeys(
+        ("study", "results", "workers", *(f"sweep.{f.name}" for f in fields(SweepSettings))),
+        "this changes no result, so give it one value only",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """Overrides that go together.
+
+    Attributes:
+        place: where the study's file has them, for messages.
+        overrides: as they are written there; one may have several values.
+    """
+
+    place: str
+    overrides: tuple[str, ...]
+
+
+class Combinations:
+    """The combinations of a study.
+
+    Attributes:
+        notes: what a reader has to know of them, once they are listed.
+    """
+
+    def __init__(
+        self, params: Mapping[str, str], cases: object, case_settings: object, ends: bool
+    ) -> None:
+        """Keep what the study's file says; what is wrong with it is raised by `overrides`.
+
+        Args:
+            params: values that are swept, by key: "1,2,3".
+            cases: mapping of names to overrides, or list of overrides; None for a single one.
+            case_settings: list of overrides; None for a single one.
+            ends: of several values take the first and the last only, and note that.
+        """
+        self._params, self._ends = dict(params), ends
+        self._cases, self._case_settings = cases, case_settings
+        self.notes: list[str] = []
+
+    def overrides(self, arguments: Sequence[str], parser: OverridesParser) -> list[list[str]]:
+        """The overrides of every point, in order.
+
+        Args:
+            arguments: overrides of the command line, which win over the study's own.
+            parser: reads overrides.
+
+        Raises:
+            ConfigError: something cannot be read, or cannot be swept.
+        """
+        cases = read_cases(self._cases, self._case_settings)
+        typed = parser.parse_overrides(list(arguments))
+        typed_keys = {override.key_or_group for override in typed}
+        values: dict[str, list[str]] = {}
+        swept = [quote_options(f"{key}={value}") for key, value in self._params.items()]
+        for override in parser.parse_overrides(swept):
+            _values(override)  # what cannot be swept is refused even where the command line wins
+            if override.key_or_group not in typed_keys:
+                values[override.get_key_element()] = self._study_values(override)
+        for override in typed:
+            values[override.get_key_element()] = _values(override)
+        combinations = [
+            overrides
+            for case in cases
+            for overrides in self._combinations_of(case, parser, typed_keys)
+        ]
+        self.notes = list(dict.fromkeys(self.notes))
+        return [
+            [*job, *overrides]
+            for job in itertools.product(*values.values())
+            for overrides in combinations
+        ]
+
+    def _combinations_of(
+        self, case: Case, parser: OverridesParser, typed_keys: set[str]
+    ) -> Iterator[tuple[str, ...]]:
+        """The combinations of a case's values, without the keys that the command line gives."""
+        swept_keys = {key.lstrip("+~") for key in self._params}
+        values: dict[str, list[str]] = {}
+        for word in case.overrides:
+            place = f"{case.place}: {word}"
+            try:
+                override = parser.parse_override(quote_options(word))
+            except HydraException:
+                raise ConfigError(f"{place} cannot be read as key=value") from None
+            key = override.key_or_group
+            if key in _NOT_SWEPT:
+                raise ConfigError(f"{place}: {_NOT_SWEPT[key]}")
+            if key in values:
+                raise ConfigError(f"{place} is the second value of {key} in this case; keep one")
+            if key in swept_keys:
+                raise ConfigError(f"{place}: params sweep {key} too; leave it to one of them")
+            values[key] = [] if key in typed_keys else self._study_values(override)
+        return itertools.product(*(each for key, each in values.items() if key not in typed_keys))
+
+    def _study_values(self, override: Override) -> list[str]:
+        """What a study gives a key, or the ends of it; notes what the ends stand for."""
+        values = _values(override)
+        if self._ends and len(values) > 2:
+            every = ", ".join(override.sweep_string_iterator())
+            first, *_, last = override.sweep_string_iterator()
+            key = override.get_key_element()
+            self.notes.append(f"{key}: {first} and {last} stand for all of {every}")
+            values = [values[0], values[-1]]
+        return values
+
+
+def read_cases(cases: object, case_settings: object) -> list[Case]:
+    """Every case in each of its settings.
+
+    Args:
+        cases: mapping of names to overrides, or list of overrides; None for a single one.
+        case_settings: list of overrides; None for a single one.
+
+    Raises:
+        ConfigError: something else.
+    """
+    settings = _lists(_plain(case_settings) or [[]], "case_settings")
+    cases = _plain(cases) or [[]]
+    read = []
+    if not isinstance(cases, dict):
+        for i, words in enumerate(_lists(cases, "cases")):
+            place = f"hydra.sweeper.cases[{i}]"
+            read += [Case(place, (*setting, *words)) for setting in settings]
+        return read
+    for name, content in cases.items():
+        place = f"hydra.sweeper.cases.{name}"
+        if isinstance(content, list) and content and isinstance(content[0], list):
+            variants = [tuple(words) for words in _lists(content, f"cases.{name}")]
+        else:
+            (words,) = _lists([content], f"cases.{name}")
+            variants = [(*setting, *words) for setting in settings]
+        read += [Case(place, (_name_override(name), *words)) for words in variants]
+    return read
+
+
+def _name_override(name: object) -> str:
+    """The override that gives a case's name to its points."""
+    text = str(name).replace("\\", "\\\\").replace("'", "\\'")
+    return f"case='{text}'"
+
+
+def _plain(value: object) -> Any:
+    """A config as plain lists and dicts."""
+    return OmegaConf.to_container(value) if OmegaConf.is_config(value) else value
+
+
+def _lists(lists: Any, key: str) -> list[list[str]]:
+    """Lists of overrides, as they are written.
+
+    Raises:
+        ConfigError: they are something else.
+    """
+    if not isinstance(lists, list):
+        raise ConfigError(f"hydra.sweeper: {key}: {lists!r} is no list of lists of overrides")
+    for i, words in enumerate(lists):
+        if not (isinstance(words, list) and all(isinstance(word, str) for word in words)):
+            place = f"{key}[{i}]" if len(lists) > 1 or not key.startswith("cases.") else key
+            raise ConfigError(
+                f"hydra.sweeper: {place}: {words!r} is no list of overrides, such as "
+                "[dt=0.5, seed=1]"
+            )
+    return lists
+
+
+def _values(override: Override) -> list[str]:
+    """The overrides that one with several values stands for."""
+    key, name = override.get_key_element(), override.key_or_group
+    if not override.is_sweep_override():
+        return [f"{key}={override.get_value_element_as_str()}"]
+    if name in _NOT_SWEPT:
+        raise ConfigError(f"{override.input_line}: {_NOT_SWEPT[name]}")
+    if not override.is_discrete_sweep():
+        raise ConfigError(f"{override.input_line}: cannot be swept; list its values")
+    values = [quote_options(f"{key}={value}") for value in override.sweep_string_iterator()]
+    if not values:
+        raise ConfigError(f"{override.input_line}: there is no value to sweep")
+    return values
