@@ -8,10 +8,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
+# Exit codes of all commands: all is done, something failed, the config is wrong, Ctrl-C.
 DONE, FAILED, REFUSED, STOPPED = 0, 1, 2, 130
 
 
@@ -52,21 +54,26 @@ def version_base() -> dict[str, str]:
     return {"version_base": "1.3"} if hydra.__version__.startswith("1.3.") else {}
 
 
-def run_command(config_name: str, act: Callable[[dict[str, Any]], int]) -> int:
+def run_command(
+    config_name: str,
+    act: Callable[[dict[str, Any]], int],
+    failures: tuple[type[Exception], ...] = (),
+) -> int:
     """Compose a config from the command line, and act on it.
 
     Args:
         config_name: a file of conf/.
         act: takes the resolved config and returns the exit status.
+        failures: errors of a sweep that say all there is to say.
 
     Returns:
-        that status; 2 if the config is wrong, 130 after Ctrl-C.
+        the status of `act`; FAILED, REFUSED for a wrong config, or STOPPED after Ctrl-C.
     """
     import hydra
     from omegaconf import DictConfig
 
     from experiments.config.command_line import command_words
-    from experiments.config.explain import explain
+    from experiments.config.explain import explain, of_config
     from experiments.config.paths import CONF
     from experiments.config.read import ConfigError, plain_tree
 
@@ -77,6 +84,9 @@ def run_command(config_name: str, act: Callable[[dict[str, Any]], int]) -> int:
         except ConfigError as error:
             print(error, file=sys.stderr)
             raise SystemExit(REFUSED) from None
+        except Exception:
+            traceback.print_exc()
+            raise SystemExit(FAILED) from None
         if status != DONE:
             raise SystemExit(status)
 
@@ -86,7 +96,14 @@ def run_command(config_name: str, act: Callable[[dict[str, Any]], int]) -> int:
         hydra.main(config_path=str(CONF), config_name=config_name, **version_base())(task)()
     except KeyboardInterrupt:
         return STOPPED
+    except failures as error:
+        print(error, file=sys.stderr)
+        return FAILED
     except Exception as error:
+        if isinstance(error, OSError) and not of_config(error):
+            # No room or no right to write: nothing that a config could mend.
+            print(f"{error}; what has finished is kept", file=sys.stderr)
+            return FAILED
         print(explain(error), file=sys.stderr)
         return REFUSED
     return DONE
@@ -102,7 +119,7 @@ def _start(module: str) -> int:
     ours = os.path.dirname(os.path.abspath(__file__))
     sys.path[:] = [path for path in sys.path if os.path.abspath(path) != ours] + [os.getcwd()]
     usual = signal.getsignal(signal.SIGINT)
-    if usual is not signal.SIG_IGN:  # as in the background of a script
+    if usual is not signal.SIG_IGN:  # which it is in the background of a script
         signal.signal(signal.SIGINT, _leave)
     main = import_module(module).main
     try:

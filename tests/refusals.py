@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from experiments import run
+from experiments import app, run
 
 
 def refusal(
@@ -17,7 +17,7 @@ def refusal(
     except SystemExit as stop:
         status = stop.code
     out, err = capsys.readouterr()
-    assert status == run.REFUSED
+    assert status == app.REFUSED
     assert out == ""
     assert "Traceback" not in err
     assert len(err.splitlines()) < 10

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from omegaconf import DictConfig
 
 from experiments.config.read import ConfigError, plain_tree
@@ -12,13 +14,13 @@ from experiments.tracking.points import State
 _SWEEP_ONLY = ("only", "limit", "time_limit", "retries", "fail_fast", "mix_sources")
 
 
-def run_single(config: DictConfig) -> None:
-    """Run the point of a composed config, unless it is finished; prints its log either way.
+def run_single(tree: dict[str, Any]) -> None:
+    """Run the point of a resolved config, unless it is finished; prints its log either way.
 
     Raises:
         ConfigError: the config cannot be run.
     """
-    point, settings, study = read_point(plain_tree(config))
+    point, settings, study = read_point(tree)
     for option in _SWEEP_ONLY:
         if getattr(study.sweep, option):
             raise ConfigError(f"sweep.{option}: only a sweep heeds it; add -m, or leave it out")

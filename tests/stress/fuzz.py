@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from experiments import infer, run
+from experiments import app, infer, run
 from experiments.config.paths import CONF
 from experiments.sweep.plugins import register_plugins
 
@@ -259,7 +259,7 @@ def attempt(case: Case, folder: Path, separate: bool) -> str | None:
     status, out, err = (_as_command if separate else _in_process)(script, words, folder)
     if sorted(folder.rglob("*")) != before:
         return f"wrote {sorted(set(folder.rglob('*')) - set(before))}"
-    if status != run.REFUSED:
+    if status != app.REFUSED:
         return f"exit status {status}: {err[-300:]!r}"
     if "Traceback" in err + out:
         return f"traceback: {err[-600:]}"
