@@ -128,7 +128,10 @@ class Combinations:
             if key in _NOT_SWEPT:
                 raise ConfigError(f"{place}: {_NOT_SWEPT[key]}")
             if key in values:
-                raise ConfigError(f"{place} is the second value of {key} in this case; keep one")
+                raise ConfigError(
+                    f"{place} is the second value of {key} in this case; keep one, or give the "
+                    "case settings of its own, as a list of lists"
+                )
             if key in swept_keys:
                 raise ConfigError(f"{place}: params sweep {key} too; leave it to one of them")
             values[key] = [] if key in typed_keys else self._study_values(override)
@@ -177,8 +180,8 @@ def read_cases(cases: object, case_settings: object) -> list[Case]:
 
 def _name_override(name: object) -> str:
     """The override that gives a case's name to its points."""
-    text = str(name).replace("\\", "\\\\").replace("'", "\\'")
-    return f"case='{text}'"
+    quote = '"' if "'" in str(name) else "'"
+    return f"case={quote}{name}{quote}"
 
 
 def _plain(value: object) -> Any:

@@ -1,0 +1,142 @@
+"""The overrides of a sweep's points: swept values, cases, and the settings in which cases run."""
+
+from typing import Any
+
+import pytest
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from omegaconf import OmegaConf
+
+from experiments.config.read import ConfigError
+from experiments.sweep.combinations import Case, Combinations, read_cases
+
+
+def listed(
+    *arguments: str,
+    params: dict[str, str] | None = None,
+    cases: Any = None,
+    case_settings: Any = None,
+    ends: bool = False,
+) -> list[str]:
+    """The overrides of every point, each point's as one text; then the notes."""
+    combinations = Combinations(
+        params or {},
+        OmegaConf.create(cases) if isinstance(cases, dict | list) else cases,
+        None if case_settings is None else OmegaConf.create(case_settings),
+        ends,
+    )
+    jobs = combinations.overrides(arguments, OverridesParser.create())
+    return [" ".join(job) for job in jobs] + combinations.notes
+
+
+def test_study_without_values_has_one_point() -> None:
+    assert listed() == [""]
+    assert listed("seed=3") == ["seed=3"]
+
+
+def test_later_values_change_faster_and_cases_fastest() -> None:
+    points = listed("seed=0,1", params={"dt": "0.5,1"}, cases=[["actions=3"], []])
+    assert points == [
+        f"dt={dt} seed={seed}{case}"
+        for dt in ("0.5", "1")
+        for seed in (0, 1)
+        for case in (" actions=3", "")
+    ]
+
+
+def test_option_of_a_group_stays_a_word() -> None:
+    assert listed(params={"grid": "100,400"}) == ["grid='100'", "grid='400'"]
+
+
+def test_case_with_a_name_says_it_first() -> None:
+    cases = {"default": [], "temperature: 0.5": ["temperature=0.5", "seed=0,1"]}
+    assert listed(cases=cases) == [
+        "case='default'",
+        "case='temperature: 0.5' temperature=0.5 seed=0",
+        "case='temperature: 0.5' temperature=0.5 seed=1",
+    ]
+    (override,) = OverridesParser.create().parse_overrides(listed(cases={"it's so": []}))
+    assert override.value() == "it's so"
+
+
+SETTINGS = [["dt=0.25", "grid=100,400"], ["dt=0.5"]]
+
+
+def test_each_case_runs_in_each_of_the_settings() -> None:
+    points = [f"{settings}{words}" for words in (" seed=1", " seed=2")
+              for settings in ("dt=0.25 grid='100'", "dt=0.25 grid='400'", "dt=0.5")]  # fmt: skip
+    assert listed(cases=[["seed=1"], ["seed=2"]], case_settings=SETTINGS) == points
+    named = listed(cases={"a": ["seed=1"], "b": ["seed=2"]}, case_settings=SETTINGS)
+    assert named == [f"case='{'ab'[i // 3]}' {point}" for i, point in enumerate(points)]
+    assert listed(case_settings=SETTINGS) == [point[:-7] for point in points[:3]]
+
+
+def test_case_may_have_settings_of_its_own() -> None:
+    cases = {"a": [], "b": [["dt=1.0", "seed=1"], ["dt=2.0,3.0"]]}
+    assert listed(cases=cases, case_settings=[["dt=0.5"]]) == [
+        "case='a' dt=0.5",
+        *("case='b' dt=1.0 seed=1", "case='b' dt=2.0", "case='b' dt=3.0"),
+    ]
+
+
+def test_command_line_wins_over_each_key_of_a_study() -> None:
+    study = {"params": {"truth": "c1,c2"}, "cases": {"a": ["seed=1"]}, "case_settings": SETTINGS}
+    assert listed("seed=4", "truth=wall", **study) == [
+        f"seed=4 truth=wall case='a' {setting}"
+        for setting in ("dt=0.25 grid='100'", "dt=0.25 grid='400'", "dt=0.5")
+    ]
+    assert listed("dt=2", "grid='900'", **study)[0] == "truth=c1 dt=2 grid='900' case='a' seed=1"
+
+
+def test_ends_stand_for_all_values_of_a_study_and_say_so() -> None:
+    study = {"params": {"dt": "1,2,3"}, "cases": {"a": ["seed=4,5,6"], "b": ["seed=4,5,6"]}}
+    points = listed("horizon=1,2,3", **study, ends=True)
+    assert points[-2:] == [
+        "dt: 1 and 3 stand for all of 1, 2, 3",
+        "seed: 4 and 6 stand for all of 4, 5, 6",
+    ]
+    assert len(points) == 2 * 3 * 2 * 2 + 2
+    assert points[0] == "dt=1 horizon=1 case='a' seed=4"
+    assert listed(params={"dt": "1,2"}, ends=True) == ["dt=1", "dt=2"]
+
+
+@pytest.mark.parametrize(
+    ("study", "message"),
+    [
+        ({"cases": 3}, "hydra.sweeper: cases: 3 is no list of lists of overrides"),
+        ({"cases": [[], "seed"]}, "hydra.sweeper: cases[1]: 'seed' is no list of overrides, such"),
+        ({"cases": [[3]]}, "hydra.sweeper: cases[0]: [3] is no list of overrides, such as"),
+        ({"cases": {"a": "seed=1"}}, "hydra.sweeper: cases.a: 'seed=1' is no list of overrides"),
+        ({"cases": {"a": None}}, "hydra.sweeper: cases.a: None is no list of overrides"),
+        ({"cases": {"a": [["seed=1"], 3]}}, "hydra.sweeper: cases.a[1]: 3 is no list of overrides"),
+        ({"case_settings": {"a": []}}, "hydra.sweeper: case_settings: {'a': []} is no list of"),
+        ({"case_settings": ["dt=1"]}, "hydra.sweeper: case_settings[0]: 'dt=1' is no list of over"),
+        ({"cases": {"a": ["seed"]}}, "hydra.sweeper.cases.a: seed cannot be read as key=value"),
+        (
+            {"cases": {"a: 1": ["dt=1"]}, "case_settings": [["dt=2"]]},
+            "hydra.sweeper.cases.a: 1: dt=1 is the second value of dt in this case; keep one, or",
+        ),
+        (
+            {"cases": {"a": ["case=b"]}},
+            "hydra.sweeper.cases.a: case=b is the second value of case in this case; keep one",
+        ),
+        (
+            {"params": {"dt": "1,2"}, "case_settings": [["dt=2"]]},
+            "hydra.sweeper.cases[0]: dt=2: params sweep dt too; leave it to one of them",
+        ),
+        ({"cases": {"a": ["study=x"]}}, "hydra.sweeper.cases.a: study=x: this changes no result"),
+        ({"params": {"study": "a,b"}}, "study=a,b: this changes no result, so give it one value"),
+        ({"params": {"dt": "interval(0,1)"}}, "dt=interval(0,1): cannot be swept; list its value"),
+    ],
+)
+def test_wrong_study_is_refused_with_its_place(study: dict[str, Any], message: str) -> None:
+    with pytest.raises(ConfigError) as refusal:
+        listed(**study)
+    assert str(refusal.value).startswith(message)
+
+
+def test_cases_are_read_with_their_places() -> None:
+    assert read_cases(None, None) == [Case("hydra.sweeper.cases[0]", ())]
+    assert read_cases({"a": ["x=1"]}, [["y=1"], ["y=2"]]) == [
+        Case("hydra.sweeper.cases.a", ("case='a'", "y=1", "x=1")),
+        Case("hydra.sweeper.cases.a", ("case='a'", "y=2", "x=1")),
+    ]
