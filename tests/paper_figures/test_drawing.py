@@ -19,10 +19,10 @@ from PIL import Image
 from sweeps import gone
 
 from experiments.config.paths import CHECKOUT
+from experiments.tracking.figure_notes import concerns
 from paper_figures import state_space
 from paper_figures.__main__ import main
 from paper_figures.drawing import FIGURES, Drawing, draw_studies
-from experiments.tracking.figure_notes import concerns
 
 STATE_SPACE = {name: study_tables()[name] for name in state_space.TABLES}
 
