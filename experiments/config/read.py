@@ -90,8 +90,9 @@ def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
     Raises:
         ConfigError: listing every problem.
     """
-    # How demonstrations are made plays no part, and samples in a cell are compared.
-    settings = checked(AdviceSettings, _without(tree, ("safety", "transition", "truth")))
+    # How demonstrations are made plays no part; time steps and samples in a cell are compared.
+    unused = ("safety", "truth", "dt", "transition", "temperature", "inference")
+    settings = checked(AdviceSettings, _without(tree, unused))
     _refuse(advice_count_problems(settings))
     _refuse(advice_shape_problems(settings))
     _refuse(budget_problems(settings))

@@ -160,7 +160,7 @@ def test_each_rule_of_the_recommendation_gives_way_to_the_one_before() -> None:
         (["budget=50"], "budget: 50 states hold none of the grids; raise it, or set grids"),
         (["grids=[[20,20],[20]]"], "grids[1]: [20] must have 2 entries, one each for angle"),
         (["grids=[[20,0]]"], "grids[0][1]: 0 must be at least 1"),
-        (["+dt=0.2"], "dt: unknown key; did you mean dts?"),
+        (["+dtt=0.2"], "dtt: unknown key; did you mean dts?"),
         (["actions=[9,9]"], "actions: [9, 9] must be one number, or a list of 1"),
         (["tasks.upper=[1.0]"], "tasks.upper: [1.0] must have 2 entries"),
         (["system=double_integrator", "horizon=0.1", "dts=[0.1]", "pairs=3"], "tasks: none of the"),

@@ -52,6 +52,15 @@ class Region:
 class TaskSettings(Region):
     """Where starts and goals are drawn, and which of the tasks count."""
 
+    lower: Annotated[
+        tuple[Number | None, ...],
+        about(
+            "lower ends of the box that starts and goals are drawn from; null, at both ends, is "
+            "the whole dimension",
+            "of the state",
+        ),
+    ]
+    upper: Annotated[tuple[Number | None, ...], about("upper ends of that box", "of the state")]
     goal: Annotated[
         tuple[NotNegative | None, ...] | None,
         about(

@@ -22,7 +22,9 @@ from experiments.sweep.plugins import register_plugins
 register_plugins()
 
 OPTIONS = {
-    f"{path.parent.relative_to(CONF)}={path.stem}": path for path in sorted(CONF.rglob("*/*.yaml"))
+    f"{path.parent.name}={path.stem}": path
+    for path in sorted(CONF.glob("*/*.yaml"))
+    if path.parent.name != "base"  # defaults, not options
 }
 # What the smoke scale may set: numbers of trials, the horizon, and the study that the tables go to.
 SMALLER = {"study", "horizon", "rollouts", "demonstrations", "ranks"}

@@ -1,4 +1,4 @@
-"""The README's own system, run in a folder of its own, and what is refused about others."""
+"""The own system of conf/README.md, in a folder of its own, and what is refused about others."""
 
 import os
 import re
@@ -10,25 +10,26 @@ import pandas as pd
 import pytest
 from refusals import refusal
 
-from experiments.config.paths import CHECKOUT
+from experiments.config.paths import CHECKOUT, CONF
 from experiments.tracking import sources
 from experiments.tracking.points import point_source
 
-SECTION = (CHECKOUT / "README.md").read_text().split("\n## Your own system\n")[1].split("\n## ")[0]
-# Indented blocks: a module, a config, and the commands.
-BLOCKS = [
-    re.sub("^    ", "", block, flags=re.MULTILINE).strip() + "\n"
-    for block in re.findall(r"(?:^(?:    .*)?\n)+", SECTION, flags=re.MULTILINE)
-    if block.strip()
-]
+SECTION = (CONF / "README.md").read_text().split("\n## Your own system\n")[1]
+# A module, a config, and the commands.
+BLOCKS = re.findall(r"^```\w+\n(.*?)^```", SECTION, flags=re.MULTILINE | re.DOTALL)
 SCRIPTS = {
     "mlci-run": [str(CHECKOUT / "experiments" / "run.py")],
     "mlci-infer": [str(CHECKOUT / "experiments" / "infer.py")],
+    "mlci-advise": [str(CHECKOUT / "experiments" / "advise.py")],
     "mlci-results": [str(CHECKOUT / "experiments" / "results.py")],
     "mlci-figures": ["-m", "paper_figures"],
 }
 SMALL = ["grid.shape=[8,8,8]"]
-SMOKE = {"mlci-run": ["scale=smoke", "safety.shape=[21,21,12]", *SMALL], "mlci-infer": SMALL}
+SMOKE = {
+    "mlci-run": ["scale=smoke", "safety.shape=[21,21,12]", *SMALL],
+    "mlci-infer": SMALL,
+    "mlci-advise": [*SMALL, "grids=[[8,8,8]]", "dts=[1.0]", "pairs=4", "remedy=1"],
+}
 
 
 @pytest.fixture
@@ -83,6 +84,8 @@ def test_every_command_works_in_a_folder_of_its_own(folder: Path) -> None:
     assert status == 0, err
     assert f"{paths['demonstration'].nunique()} used, 0 files not used" in out
     assert re.search(r" x .* m, y .* m$", out, flags=re.MULTILINE)
+    status, out, err = command(folder, "mlci-advise subject=unicycle")
+    assert "8x8x8" in out, err
     assert sorted(path.name for path in folder.iterdir() if path.name != "__pycache__") == [
         *("conf", "recorded", "results", "unicycle.py")
     ]

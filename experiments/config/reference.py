@@ -1,0 +1,177 @@
+"""Write what the settings tell: JSON schemas for editors, and the tables of conf/README.md.
+
+`python -m experiments.config.reference` writes conf/schema/*.json and the tables between the marks.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from omegaconf import OmegaConf
+from pydantic import TypeAdapter
+from pydantic.json_schema import GenerateJsonSchema
+
+from experiments.config.paths import CONF
+from experiments.config.settings import AdviceSettings, RecordedSettings, RunSettings
+from experiments.config.settings.kinds import MULTIPLE_OF_PI
+from experiments.tracking.files import replace_file
+from experiments.tracking.trees import flatten
+
+# The file of a command in conf/ to the settings that it makes.
+COMMANDS: dict[str, Any] = {
+    "config": RunSettings,
+    "infer": RecordedSettings,
+    "advise": AdviceSettings,
+}
+_GROUPS = ("system", "truth", "grid")  # whose files set values of which each command has one
+_BOUNDS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+_TYPES = {
+    "integer": "whole number",
+    "number": "number",
+    "string": "word",
+    "boolean": "true or false",
+    "null": "null",
+}
+
+
+def schema(command: str) -> dict[str, Any]:
+    """The JSON schema of a command's config; any value may be left to another file."""
+    tree = TypeAdapter(COMMANDS[command]).json_schema(schema_generator=_WithMultiplesOfPi)
+    for node in (tree, *tree["$defs"].values()):
+        node.pop("required", None)
+    target = tree["$defs"]["SystemSettings"]["properties"]["target"]
+    tree["$defs"]["SystemSettings"] = {
+        "type": "object",
+        "properties": {"_target_": {**target, "title": "Target"}},
+        "additionalProperties": True,  # what the class takes
+    }
+    tree["properties"] |= {"defaults": {"type": "array"}, "hydra": {"type": "object"}}
+    return tree
+
+
+def readme(text: str) -> str:
+    """The text of conf/README.md with its tables written anew."""
+    common: set[str] = set()
+    for command in COMMANDS:
+        lines = list(_rows(command))
+        shared = [row.split(" | ")[0].removeprefix("| ") for row in lines if row in common]
+        new = [row for row in lines if row not in common]
+        common.update(lines)
+        head = ["| key | meaning | unit | default | values |", "|---|---|---|---|---|"]
+        beside = [f"Beside these, as above: {', '.join(shared)}.", ""] if shared else []
+        table = "\n".join([*beside, *head, *new])
+        mark, end = f"<!-- {command}: written by experiments.config.reference -->", "<!-- end -->"
+        pattern = re.compile(f"{re.escape(mark)}\n.*?{re.escape(end)}", re.DOTALL)
+        assert pattern.search(text), f"conf/README.md lacks {mark}"
+        text = pattern.sub(lambda _, new=f"{mark}\n{table}\n{end}": new, text)  # type: ignore[misc]
+    return text
+
+
+def main() -> None:
+    """Write the schemas and the tables."""
+    (CONF / "schema").mkdir(exist_ok=True)
+    for command in COMMANDS:
+        replace_file(CONF / "schema" / f"{command}.json", schema_bytes(command))
+    path = CONF / "README.md"
+    replace_file(path, readme(path.read_text()).encode())
+
+
+def schema_bytes(command: str) -> bytes:
+    """The content of a command's file in conf/schema."""
+    return (json.dumps(schema(command), indent=2, ensure_ascii=False) + "\n").encode()
+
+
+class _WithMultiplesOfPi(GenerateJsonSchema):
+    """Numbers may be written as multiples of pi."""
+
+    def float_schema(self, schema: Any) -> dict[str, Any]:
+        """A number, or words such as "6/5 pi"."""
+        words = {"type": "string", "pattern": f"^{MULTIPLE_OF_PI}$"}
+        return {"anyOf": [super().float_schema(schema), words]}
+
+
+def _rows(command: str) -> Iterator[str]:
+    """A row of a table for each value that a command takes."""
+    tree, defaults = schema(command), _defaults(command)
+
+    def rows_of(node: dict[str, Any], prefix: str) -> Iterator[str]:
+        for name, field in node["properties"].items():
+            key, content = f"{prefix}{name}", _resolved(field, tree)
+            if key in ("defaults", "hydra"):
+                continue
+            if name != "system" and "description" not in field and "properties" in content:
+                yield from rows_of(content, f"{key}.")
+                continue
+            cells = (
+                f"`{key}`",
+                field["description"],
+                field.get("unit", ""),
+                defaults.get(key, ""),
+                _values(field, tree),
+            )
+            yield f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
+
+    yield from rows_of(tree, "")
+
+
+def _values(field: dict[str, Any], tree: dict[str, Any]) -> str:
+    """What a field of a schema may be, in words."""
+    node = _resolved(field, tree)
+    if choices := node.get("enum"):
+        return " or ".join(f"`{choice}`" for choice in choices)
+    if several := node.get("anyOf") or node.get("oneOf"):
+        each = [_values(one, tree) for one in several if "pattern" not in one]
+        return " or ".join(dict.fromkeys(each))
+    if node["type"] == "array":
+        return f"list of ({_values(node['items'], tree)})"
+    if node["type"] == "object":
+        keys = [*node.get("properties", {}), *["..."] * (node["additionalProperties"] is True)]
+        return f"{{{', '.join(keys)}}}"
+    bounds = [f"{sign} {node[bound]:.16g}" for bound, sign in _BOUNDS.items() if bound in node]
+    return " ".join([_TYPES[node["type"]], ", ".join(bounds)]).strip()
+
+
+def _resolved(field: dict[str, Any], tree: dict[str, Any]) -> dict[str, Any]:
+    """A field of a schema, or what it refers to."""
+    name = field.get("$ref", "").rpartition("/")[2]
+    resolved: dict[str, Any] = tree["$defs"][name] if name else field
+    return resolved
+
+
+def _defaults(command: str) -> dict[str, str]:
+    """The default of each key, spelt as in a file, or the group that sets it."""
+    spelling: dict[str, str] = {}
+    for path in default_files(command):
+        for key, value in flatten(values_of(path)).items():
+            spelling[key] = f"`{value if isinstance(value, str) else json.dumps(value)}`"
+        spelling |= {key: "`{}`" for key, value in values_of(path).items() if value == {}}
+    for group in _GROUPS:
+        files = [set(flatten(values_of(path))) for path in sorted((CONF / group).glob("*.yaml"))]
+        spelling |= dict.fromkeys(set.intersection(*files), f"by `{group}`")
+    spelling["system"] = "by `system`"
+    return {key: "to be given" if value == "`???`" else value for key, value in spelling.items()}
+
+
+def default_files(command: str) -> list[Path]:
+    """The files that hold a command's defaults: its own, and those of conf/base that it names."""
+    entries = OmegaConf.to_container(OmegaConf.load(CONF / f"{command}.yaml"))["defaults"]  # type: ignore[index,call-overload]
+    base = [entry for entry in entries if isinstance(entry, str) and entry != "_self_"]
+    return [CONF / f"{name}.yaml" for name in (command, *base)]
+
+
+@cache
+def values_of(path: Path) -> dict[str, Any]:
+    """The values that a file of conf/ sets, by their full keys."""
+    tree: Any = OmegaConf.to_container(OmegaConf.load(path))
+    values = {key: value for key, value in tree.items() if key not in ("defaults", "hydra")}
+    is_global = path.parent == CONF or "# @package _global_" in path.read_text()
+    return values if is_global else {path.parent.name: values}
+
+
+if __name__ == "__main__":
+    main()
