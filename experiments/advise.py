@@ -11,7 +11,7 @@ if __name__ == "__main__":  # before all that takes time to import
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from tqdm import tqdm
@@ -22,10 +22,9 @@ from experiments.config.settings import AdviceSettings
 from experiments.console import table_lines, words
 from mlci.demonstrations import Task
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
+from mlci.diagnosis import MOST_UNREACHABLE, Diagnosis, diagnose
 from mlci.grids import Grid
-from mlci.maxent import log_partition, reachable, violation_probabilities
-from mlci.metrics import MOST_UNREACHABLE, Diagnosis, diagnose
-from mlci.simulate import step_count
+from mlci.maxent import TrajectoryDistribution, reachable_cells
 from mlci.spaces import Bools, Floats
 from mlci.tabular import action_grid, discretize
 
@@ -216,30 +215,29 @@ def _try(
     settings: AdviceSettings, grid: Grid, dt: float, samples: int, tasks: Sequence[Task]
 ) -> Candidate:
     """Form a tabular model and see what it can do."""
-    system, actions = settings.model, _actions(settings)
     before = time.process_time()
-    mdp = discretize(system, grid, actions, dt, settings.candidates, samples)
+    model = discretize(settings.model, grid, _actions(settings), dt, settings.candidates, samples)
     formed = time.process_time() - before
-    steps = step_count(settings.horizon, dt)
-    begins = [int(grid.index(task.start)) for task in tasks]
-    ends = [grid.cells_in(task.goal) for task in tasks]
-    reached = np.zeros(len(tasks), dtype=bool)
-    for j, (start, goal) in enumerate(zip(begins, ends, strict=True)):
-        reached[j] = np.isin(goal, reachable(mdp, start, steps)[-1]).any()
+    distributions = [TrajectoryDistribution.of_task(model, task) for task in tasks]
+    reached = np.array(
+        [
+            np.isin(each.goal, reachable_cells(model, each.start, each.steps)[-1]).any()
+            for each in distributions
+        ]
+    )
     task_s = np.nan
     if reached.any():
-        first = int(np.argmax(reached))
+        first = distributions[int(np.argmax(reached))]
         for _ in range(2):  # the second time without what all tasks share
             before = time.process_time()
-            log_z = log_partition(mdp, begins[first], ends[first], steps)
-            violation_probabilities(mdp, log_z, begins[first])
+            replace(first).violation_probabilities()
             task_s = time.process_time() - before
     widths = settings.candidates.upper - settings.candidates.lower
     return Candidate(
         grid=grid,
         dt=dt,
         samples=samples,
-        diagnosis=diagnose(system, grid, actions, dt, mdp),
+        diagnosis=diagnose(model),
         reached=reached,
         coarse=bool(np.any(grid.widths > widths / 2 * (1 + 1e-9))),
         discretize_s=formed,
@@ -249,7 +247,7 @@ def _try(
 
 def _actions(settings: AdviceSettings) -> Floats:
     """(A, m) the actions."""
-    return action_grid(settings.model, list(settings.action_counts))
+    return action_grid(settings.model, settings.action_counts)
 
 
 _HEAD = (

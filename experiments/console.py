@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from mlci.metrics import Diagnosis
+from mlci.diagnosis import Diagnosis
 from mlci.spaces import StateSpace
 
 

@@ -16,21 +16,22 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+import mlci.inference
 from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, read_recorded_config
 from experiments.config.settings import RecordedSettings
 from experiments.console import diagnosis_lines, ranking_lines
-from experiments.point.tables import dimension_table, ranking_table
+from experiments.point.ranking_tables import ranking_table
+from experiments.point.truth_tables import dimension_table
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.trees import canonical_json, plain
 from mlci.demonstrations import Demonstration
-from mlci.maxent import expected_violations
-from mlci.metrics import diagnose
+from mlci.diagnosis import diagnose
+from mlci.inference import Inference
 from mlci.recordings.read import Problem, read_demonstrations
-from mlci.spaces import Bools
-from mlci.tabular import action_grid, discretize
+from mlci.tabular import TabularModel, action_grid, discretize
 from paper_figures import hypothesis_map
 from paper_figures.style import save
 
@@ -49,83 +50,82 @@ def main() -> int:
 
 def infer(settings: RecordedSettings) -> int:
     """Rank the hypotheses, print the result and save it; returns the exit status."""
-    system, grid, space = settings.model, settings.cells, settings.model.space
-    demonstrations, steps, problems = _usable(settings)
+    space = settings.model.space
+    demonstrations, problems = _usable(settings)
     for problem in problems:
         print(f"not used: {problem}", file=sys.stderr)
     if not demonstrations:
         raise ConfigError("demonstrations: no file could be used; see above")
-
-    actions = action_grid(system, list(settings.action_counts))
-    mdp = discretize(
-        system,
-        grid,
-        actions,
-        settings.dt,
-        settings.candidates,
-        settings.transition.samples,
-        settings.temperature,
+    model = _tabular_model(settings)
+    inference = mlci.inference.infer(
+        model,
+        demonstrations,
+        prior_none=settings.inference.prior,
+        round_horizon=settings.round_horizon,
     )
-    starts = [int(grid.index(shown.task.start)) for shown in demonstrations]
-    goals = [grid.cells_in(shown.task.goal) for shown in demonstrations]
-    phi, reachable = expected_violations(mdp, starts, goals, steps)
-    violated = np.array([settings.candidates.violated_by(shown.states) for shown in demonstrations])
-    ranking = ranking_table(settings.candidates, phi[reachable], violated, settings.inference.prior)
-
+    ranking = ranking_table(inference)
     print(f"demonstrations  {len(demonstrations)} used, {len(problems)} files not used")
-    for line in _refutation_lines(demonstrations, violated, reachable):
+    for line in _refutation_lines(inference):
         print(line)
-    diagnosis = diagnose(system, grid, actions, settings.dt, mdp)
-    unreachable = int(np.sum(~reachable))
-    for line in diagnosis_lines(diagnosis, space.names, unreachable, len(demonstrations)):
+    unreachable = int(np.sum(~inference.reachable))
+    for line in diagnosis_lines(diagnose(model), space.names, unreachable, len(demonstrations)):
         print(line)
     for line in ranking_lines(ranking, space, settings.top):
         print(line)
-    folder = _save(settings, demonstrations, problems, ranking, phi, violated, reachable)
+    folder = _save(settings, demonstrations, problems, inference, ranking)
     print(f"written: {folder}")
     return FAILED if problems else DONE
 
 
-def _usable(
-    settings: RecordedSettings,
-) -> tuple[list[Demonstration], list[int], list[Problem]]:
-    """The demonstrations that can be used, their numbers of time steps, and what is wrong."""
-    goal = None if settings.goal is None else settings.goal.box()
+def _usable(settings: RecordedSettings) -> tuple[list[Demonstration], list[Problem]]:
+    """The demonstrations that can be used, and what is wrong with the other files."""
     read, problems = read_demonstrations(
         settings.demonstrations,
         settings.model,
         dt=settings.recorded_dt,
         start=settings.start,
-        goal=goal,
+        goal=None if settings.goal is None else settings.goal.box(),
     )
-    used, steps = [], []
-    for shown in read:
-        duration = shown.task.horizon
-        count = round(duration / settings.dt)
-        off = abs(count * settings.dt - duration)
-        if not settings.round_horizon and (count < 1 or off > _UNEVEN * settings.dt):
+    usable = []
+    for demonstration in read:
+        duration = demonstration.task.horizon
+        steps = round(duration / settings.dt)
+        off = abs(steps * settings.dt - duration)
+        if not settings.round_horizon and (steps < 1 or off > _UNEVEN * settings.dt):
             message = (
                 f"dt = {settings.dt:g} s does not cut its {duration:g} s into whole steps: choose "
                 "another dt, or set round_horizon=true"
             )
-            problems.append(Problem(shown.name, message))
-            continue
-        steps.append(max(1, count))
-        used.append(shown)
-    return used, steps, problems
+            problems.append(Problem(demonstration.name, message))
+        else:
+            usable.append(demonstration)
+    return usable, problems
 
 
-def _refutation_lines(
-    demonstrations: Sequence[Demonstration], violated: Bools, reachable: Bools
-) -> list[str]:
+def _tabular_model(settings: RecordedSettings) -> TabularModel:
+    """The tabular model with all hypotheses."""
+    return discretize(
+        settings.model,
+        settings.cells,
+        action_grid(settings.model, settings.action_counts),
+        settings.dt,
+        settings.candidates,
+        settings.transition.samples,
+        settings.temperature,
+    )
+
+
+def _refutation_lines(inference: Inference) -> list[str]:
     """Which hypotheses each demonstration refutes, by their numbers; * where it alone does."""
-    alone = np.sum(violated, axis=0) == 1
+    alone = np.sum(inference.violated, axis=0) == 1
     lines = ["      hypotheses that each refutes (* no other does):"]
-    width = max(len(shown.name) for shown in demonstrations)
-    for shown, row, reached in zip(demonstrations, violated, reachable, strict=True):
-        numbers = [f"{i}{'*' if alone[i] else ''}" for i in np.flatnonzero(row)]
-        note = "" if reached else "  (goal unreachable: adds no gain)"
-        lines.append(f"      {shown.name:{width}}  {' '.join(numbers)}{note}")
+    width = max(map(len, inference.names))
+    for name, violated, reachable in zip(
+        inference.names, inference.violated, inference.reachable, strict=True
+    ):
+        numbers = [f"{i}{'*' if alone[i] else ''}" for i in np.flatnonzero(violated)]
+        note = "" if reachable else "  (goal unreachable: adds no gain)"
+        lines.append(f"      {name:{width}}  {' '.join(numbers)}{note}")
     return lines
 
 
@@ -133,21 +133,12 @@ def _save(
     settings: RecordedSettings,
     demonstrations: Sequence[Demonstration],
     problems: Sequence[Problem],
+    inference: Inference,
     ranking: pd.DataFrame,
-    phi: np.ndarray,
-    violated: Bools,
-    reachable: Bools,
 ) -> Path:
     """Write tables, map and record into a folder of their own, named by what went in."""
-    space, names = settings.model.space, [shown.name for shown in demonstrations]
-    paths = pd.DataFrame(
-        {
-            "demonstration": np.repeat(names, [len(shown.states) for shown in demonstrations]),
-            **dict(
-                zip(space.names, np.concatenate([d.states for d in demonstrations]).T, strict=True)
-            ),
-        }
-    )
+    space = settings.model.space
+    paths = _path_table(demonstrations, space.names)
     # What decides the result: the settings that do, and the numbers that were read.
     made_from = {
         "config": {**plain(settings), "demonstrations": "", "results": None, "top": 0},
@@ -155,26 +146,7 @@ def _save(
     }
     results = results_folder(settings) / "inference"
     folder = results / digest(canonical_json(made_from))[:16]
-    count = len(settings.candidates)
-    tables = {
-        "hypotheses": ranking,
-        "demonstrations": pd.DataFrame(
-            {
-                "demonstration": names,
-                "duration": [shown.task.horizon for shown in demonstrations],
-                "reachable": reachable,
-                "violated": np.sum(violated, axis=1),
-            }
-        ),
-        "violations": pd.DataFrame(
-            {
-                "demonstration": np.repeat(names, count),
-                "hypothesis": np.tile(np.arange(count), len(names)),
-                "probability": np.where(reachable[:, None], phi, np.nan).ravel(),
-                "violated": violated.ravel(),
-            }
-        ),
-    }
+    tables = {"hypotheses": ranking, **_demonstration_tables(demonstrations, inference)}
     for name, table in tables.items():
         replace_file(folder / f"{name}.csv", csv_bytes(table))
     save(hypothesis_map.draw(ranking, paths, dimension_table(space)), folder / "map")
@@ -186,3 +158,37 @@ def _save(
     }
     replace_file(folder / "record.json", json.dumps(record, indent=1).encode() + b"\n")
     return folder
+
+
+def _path_table(demonstrations: Sequence[Demonstration], names: Sequence[str]) -> pd.DataFrame:
+    """A row a sample of each demonstration."""
+    samples = np.concatenate([demonstration.states for demonstration in demonstrations])
+    lengths = [len(demonstration.states) for demonstration in demonstrations]
+    of = np.repeat([demonstration.name for demonstration in demonstrations], lengths)
+    return pd.DataFrame({"demonstration": of, **dict(zip(names, samples.T, strict=True))})
+
+
+def _demonstration_tables(
+    demonstrations: Sequence[Demonstration], inference: Inference
+) -> dict[str, pd.DataFrame]:
+    """What each demonstration is, and what it says of each hypothesis."""
+    count, names = len(inference.hypotheses), list(inference.names)
+    phi = np.where(inference.reachable[:, None], inference.phi, np.nan)
+    return {
+        "demonstrations": pd.DataFrame(
+            {
+                "demonstration": names,
+                "duration": [demonstration.task.horizon for demonstration in demonstrations],
+                "reachable": inference.reachable,
+                "violated": np.sum(inference.violated, axis=1),
+            }
+        ),
+        "violations": pd.DataFrame(
+            {
+                "demonstration": np.repeat(names, count),
+                "hypothesis": np.tile(np.arange(count), len(names)),
+                "probability": phi.ravel(),
+                "violated": inference.violated.ravel(),
+            }
+        ),
+    }

@@ -11,11 +11,11 @@ u       control, controls     continuous control, (..., m)               rad/s^2
 h       System.dynamics       time derivative of the state, (..., n)     unit of x / s
 S       grid.size             number of grid cells (tabular states)      --
 A       len(actions)          number of actions                          --
-M       mdp.moves             moves of a cell: action x start point      --
-W       --                    ways of all cells: moves alike, merged     --
+M       model.moves           moves of a cell: action x start point      --
+W       --                    merged moves of all cells                  --
 T       steps                 transitions of a tabular trajectory        --
 K       --                    samples of a recorded path, less one       --
-C       len(constraints)      number of regions (hypotheses)             --
+C       len(regions)          number of regions (hypotheses)             --
 N       --                    number of demonstrations                   --
 dt      dt                    time step of the tabular model             s
 Z       log_z[t, s]           log partition function to go               nat
@@ -26,26 +26,59 @@ V       values                safe set's value function                  unit of
 ======  ====================  =========================================  ==============
 """
 
-# The public modules; inside them, a name without a leading underscore is public.
+from mlci.demonstrations import Demonstration, Task
+from mlci.demonstrator import demonstrate, sample_trials
+from mlci.diagnosis import Diagnosis, diagnose
+from mlci.grids import Grid
+from mlci.inference import Inference, PreparedInference, infer, prepare
+from mlci.maxent import TrajectoryDistribution
+from mlci.reachability import SafeSet, solve_safe_set
+from mlci.recordings.read import read_demonstrations, write_demonstration
+from mlci.regions import Regions
+from mlci.safety_filter import SafetyFilter
+from mlci.simulate import rollout
+from mlci.spaces import Box, StateSpace
+from mlci.system_check import check_system
+from mlci.systems import (
+    DoubleIntegrator,
+    FunctionSystem,
+    Pendulum,
+    System,
+    TelescopingPendulum,
+)
+from mlci.tabular import TabularModel, action_grid, discretize
+
 __all__ = [
-    "constraints",
-    "demonstrations",
-    "demonstrator",
-    "escapes",
-    "grids",
-    "ilqr",
-    "inference",
-    "maxent",
-    "mdp",
-    "metrics",
-    "online",
-    "reachability",
-    "recordings",
-    "safety_filter",
-    "simulate",
-    "spaces",
-    "systems",
-    "ways",
+    "Box",
+    "Demonstration",
+    "Diagnosis",
+    "DoubleIntegrator",
+    "FunctionSystem",
+    "Grid",
+    "Inference",
+    "Pendulum",
+    "PreparedInference",
+    "Regions",
+    "SafeSet",
+    "SafetyFilter",
+    "StateSpace",
+    "System",
+    "TabularModel",
+    "Task",
+    "TelescopingPendulum",
+    "TrajectoryDistribution",
+    "action_grid",
+    "check_system",
+    "demonstrate",
+    "diagnose",
+    "discretize",
+    "infer",
+    "prepare",
+    "read_demonstrations",
+    "rollout",
+    "sample_trials",
+    "solve_safe_set",
+    "write_demonstration",
 ]
 
 __version__ = "0.1.0"

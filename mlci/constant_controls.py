@@ -19,7 +19,7 @@ import numpy as np
 
 from mlci.grids import Grid
 from mlci.reachability import SafeSet
-from mlci.regions import ConstraintSet
+from mlci.regions import Regions
 from mlci.simulate import rk4_step, step_count
 from mlci.spaces import Floats
 from mlci.systems import System
@@ -29,7 +29,7 @@ _STEPS_BETWEEN = 8  # steps after which motions that cannot matter any more are 
 
 
 def escape_value(
-    system: System, constraints: ConstraintSet, states: Floats, horizon: float, step: float
+    system: System, constraints: Regions, states: Floats, horizon: float, step: float
 ) -> Floats:
     """v (B,) at states (B, n), in the unit of dist_K.
 
@@ -48,9 +48,7 @@ def escape_value(
     return np.concatenate(parts)
 
 
-def _best(
-    system: System, constraints: ConstraintSet, states: Floats, steps: int, step: float
-) -> Floats:
+def _best(system: System, constraints: Regions, states: Floats, steps: int, step: float) -> Floats:
     """v (B,) of one block of states."""
     space = system.space
     lower = np.where(space.periodic, -np.inf, space.bounds.lower)
@@ -71,8 +69,8 @@ def _best(
     return best
 
 
-def solve_escapes(
-    system: System, grid: Grid, constraints: ConstraintSet, *, horizon: float, step: float = 0.05
+def tabulate_escapes(
+    system: System, grid: Grid, constraints: Regions, *, horizon: float, step: float = 0.05
 ) -> SafeSet:
     """Tabulate v at the cell centres of a grid; see the module's head and `escape_value`."""
     values = escape_value(system, constraints, grid.centers, horizon, step)

@@ -1,10 +1,11 @@
-"""A task, and a path that was shown for it."""
+"""A task, and a demonstration: a path that somebody took to do it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mlci.spaces import Box, Floats
 
@@ -41,7 +42,7 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """A path that was shown for a task, sampled evenly.
+    """A path that somebody took to do a task, sampled evenly.
 
     Attributes:
         task: the task.
@@ -91,6 +92,25 @@ class Demonstration:
                 f"{self._title} lasts {len(states) - 1} x {self.dt} s, but its task "
                 f"{self.task.horizon} s"
             )
+
+    @classmethod
+    def from_path(
+        cls, states: ArrayLike, dt: float, *, goal: Box | None = None, name: str = ""
+    ) -> Demonstration:
+        """A recorded path whose task is read off its ends.
+
+        Args:
+            states: (K+1, n) path, without jumps in periodic dimensions (`StateSpace.unwrap`).
+            dt: time between samples [s].
+            goal: region that the demonstrator had to reach; None takes the last state.
+            name: what tables and messages call it.
+
+        Raises:
+            ValueError: as of the constructor.
+        """
+        path = np.atleast_2d(np.asarray(states, dtype=float))
+        region = Box.point(path[-1]) if goal is None else goal
+        return cls(Task(path[0], region, max(len(path) - 1, 1) * dt), path, None, dt, name)
 
     @property
     def _title(self) -> str:

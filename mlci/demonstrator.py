@@ -16,7 +16,7 @@ import numpy as np
 from mlci.demonstrations import REACHED, Demonstration, Task
 from mlci.ilqr import ControlFilter, optimize
 from mlci.reachability import SafeSet
-from mlci.regions import ConstraintSet
+from mlci.regions import Regions
 from mlci.simulate import rollout, step_count
 from mlci.spaces import Bools, Box, Floats
 from mlci.systems import System
@@ -132,7 +132,7 @@ def sample_trials(
 def demonstrate(
     system: System,
     trials: Sequence[Trial],
-    truth: ConstraintSet | None,
+    truth: Regions | None,
     safety_filter: ControlFilter | None,
     *,
     dt: float,
@@ -193,7 +193,7 @@ def demonstrate(
 
 
 def crossing(
-    system: System, trials: Sequence[Trial], truth: ConstraintSet, *, dt: float, **options: Any
+    system: System, trials: Sequence[Trial], truth: Regions, *, dt: float, **options: Any
 ) -> list[Trial]:
     """The trials for which the truth matters: the optimum, were it not there, enters it.
 
@@ -213,9 +213,7 @@ def crossing(
     ]
 
 
-def enters(
-    system: System, truth: ConstraintSet, states: Floats, controls: Floats, dt: float
-) -> Bools:
+def enters(system: System, truth: Regions, states: Floats, controls: Floats, dt: float) -> Bools:
     """Which paths (B,) enter a region of the truth.
 
     Looked for on the straight lines between samples, and at ten points between samples of the

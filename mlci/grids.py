@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.spaces import Box, Floats, Ints, StateSpace
+from mlci.spaces import Box, Floats, Ints, StateSpace, middle_and_half
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ class Grid:
         return lower + place * self.widths, lower + (place + 1) * self.widths
 
     def index(self, states: ArrayLike) -> Ints:
-        """Number (...,) of the cell that holds each of states (..., n), or -1 outside.
+        """Number (...,) of the cell that holds each of states (..., n), or -1 outside and for NaN.
 
         Cells are half open; the upper bound of the space belongs to the last cell.
         """
@@ -109,26 +109,30 @@ class Grid:
 
         In a dimension in which the region is a point this is the cell that holds it; otherwise it
         is every cell that the region enters, more than its edge.
+
+        Raises:
+            ValueError: a side that is bounded at one end alone.
         """
-        chosen = []
+        centre, half = middle_and_half(region)
+        along = []
         for d, axis in enumerate(self.axes):
-            if not np.isfinite(region.widths[d]):
-                chosen.append(np.arange(self.shape[d]))
+            if not np.isfinite(half[d]):
+                along.append(np.arange(self.shape[d]))
                 continue
             middle = self.space.bounds.lower.copy()
-            middle[d] = (region.lower[d] + region.upper[d]) / 2
-            if region.widths[d] == 0:
+            middle[d] = centre[d]
+            if half[d] == 0:
                 cell = int(self.index(middle))
                 if cell < 0:
                     return np.empty(0, dtype=np.int64)
-                chosen.append(np.array([np.unravel_index(cell, self.shape)[d]]))
+                along.append(np.array([np.unravel_index(cell, self.shape)[d]]))
                 continue
             probes = np.tile(middle, (len(axis), 1))
             probes[:, d] = axis
             apart = np.abs(self.space.difference(probes, middle)[:, d])
             reach = (region.widths[d] + self.widths[d]) / 2
-            chosen.append(np.flatnonzero(apart < reach * (1 - 1e-12)))
-        mesh = np.meshgrid(*chosen, indexing="ij")
+            along.append(np.flatnonzero(apart < reach * (1 - 1e-12)))
+        mesh = np.meshgrid(*along, indexing="ij")
         return np.sort(np.ravel_multi_index([part.ravel() for part in mesh], self.shape))
 
     def interpolate(self, values: Floats, states: ArrayLike) -> Floats:

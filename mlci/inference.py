@@ -1,162 +1,308 @@
-"""From violation probabilities and demonstrations to ranked constraints, (4)-(6) and (12).
+"""From a tabular model and demonstrations to ranked hypotheses, in one step or in two.
 
-Adding constraint i multiplies the likelihood of the demonstrations by prod_j 1 / (1 - Phi_i^j),
-one factor a demonstration (each has its own start and goal, and so its own Z), or by 0 if any of
-them violates i. The log of that factor is the gain L_i.
+All that takes time depends on the tasks alone: starts, goals and durations. So `prepare` can do it
+before anybody moves, as section IV-C says; what is left when demonstrations arrive is to see which
+hypotheses they violate, and to rank the others. `infer` does both.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
-from scipy.special import logsumexp
 
+from mlci.demonstrations import Demonstration, Task
+from mlci.evidence import Ranking, rank_constraints
+from mlci.maxent import TrajectoryDistribution
+from mlci.regions import Regions, as_mask
 from mlci.spaces import Bools, Floats, Ints
+from mlci.tabular import Progress, TabularModel
+
+_ROWS_OF_REPR, _ROWS_OF_SUMMARY = 5, 10
 
 
 @dataclass(frozen=True, eq=False)
-class Ranking:
-    """Constraint hypotheses ranked by likelihood.
+class Inference:
+    """What N demonstrations say about C hypotheses.
 
     Attributes:
-        gain: (C,) L_i = -sum_j log(1 - Phi_i^j) [nat]. +inf if some tabular demonstration cannot
-            avoid i; -inf if i is not feasible.
-        feasible: (C,) whether no demonstration violates i.
-        rank: (C,) 1 is most likely. Ties share the mean of their ranks, so that a hypothesis that
-            explains nothing is not flattered by all the others that explain nothing; those that
-            are not feasible tie in the last places.
-        order: (C,) indices by rank, ties by index.
-        posterior: (C,) probability of each being the one constraint.
-        posterior_none: probability that there is none.
-    """
-
-    gain: Floats
-    feasible: Bools
-    rank: Floats
-    order: Ints
-    posterior: Floats
-    posterior_none: float
-
-
-def log_likelihood_gain(phi: ArrayLike) -> Floats:
-    """-log(1 - Phi) (..., C) [nat] of each demonstration: the terms of L_i, equation (6)."""
-    with np.errstate(divide="ignore"):
-        return -np.log1p(-np.asarray(phi, dtype=float))
-
-
-def rank_scores(gain: ArrayLike, feasible: ArrayLike) -> Floats:
-    """Ranks (..., C), 1 for the largest gain; ties share their mean rank, infeasible ones last."""
-    loss = -np.where(feasible, gain, -np.inf)
-    rank = np.empty(loss.shape)
-    for row in np.ndindex(loss.shape[:-1]):
-        ordered = np.sort(loss[row])
-        better = np.searchsorted(ordered, loss[row], side="left")
-        up_to_ties = np.searchsorted(ordered, loss[row], side="right")
-        rank[row] = (better + 1 + up_to_ties) / 2
-    return rank
-
-
-def rank_constraints(
-    phi: ArrayLike,
-    violated: ArrayLike,
-    prior_none: float = 0.5,
-    prior: ArrayLike | None = None,
-) -> Ranking:
-    """Rank the hypotheses, equations (4) to (6).
-
-    Args:
-        phi: (N', C) violation probabilities without the constraint, one row for each
-            demonstration whose goal the tabular MDP can reach.
-        violated: (N, C) which hypotheses each demonstration violates; those that the tabular MDP
-            cannot follow refute hypotheses all the same.
+        hypotheses: the C regions.
+        names: (N,) names of the demonstrations.
+        phi: (N, C) probability that the task's unconstrained agent violates a hypothesis; 0 for a
+            task that the tabular model cannot do, whose demonstration refutes hypotheses and
+            supports none.
+        violated: (N, C) which hypotheses a demonstration violates.
+        reachable: (N,) whether the tabular model can do the task.
         prior_none: prior probability that there is no constraint.
-        prior: (C,) prior weights of the hypotheses; equal by default.
 
     Raises:
-        ValueError: shapes that disagree, probabilities outside [0, 1].
+        ValueError: shapes that disagree.
     """
-    phi, violated = np.asarray(phi, dtype=float), np.asarray(violated, dtype=bool)
-    if phi.ndim != 2 or violated.ndim != 2 or phi.shape[1] != violated.shape[1]:
-        raise ValueError(f"phi and violated need (N, C) each, not {phi.shape}, {violated.shape}")
-    if not np.all((phi >= 0) & (phi <= 1)):
-        raise ValueError("violation probabilities must lie in [0, 1]")
-    feasible = ~np.any(violated, axis=0)
-    gain = np.where(feasible, np.sum(log_likelihood_gain(phi), axis=0), -np.inf)
-    rank = rank_scores(gain, feasible)
-    each, none = posterior(gain, prior_none, prior)
-    return Ranking(gain, feasible, rank, np.argsort(rank, kind="stable"), each, none)
+
+    hypotheses: Regions
+    names: tuple[str, ...]
+    phi: Floats
+    violated: Bools
+    reachable: Bools
+    prior_none: float = 0.5
+
+    def __post_init__(self) -> None:
+        shape = len(self.names), len(self.hypotheses)
+        if not (
+            self.phi.shape == self.violated.shape == shape == (*self.reachable.shape, shape[1])
+        ):
+            raise ValueError(
+                f"{shape[0]} demonstrations and {shape[1]} hypotheses do not fit phi "
+                f"{self.phi.shape}, violated {self.violated.shape}, reachable "
+                f"{self.reachable.shape}"
+            )
+
+    @cached_property
+    def ranking(self) -> Ranking:
+        """Gain, rank and posterior of each hypothesis, equations (4) to (6)."""
+        return rank_constraints(self.phi[self.reachable], self.violated, self.prior_none)
+
+    @property
+    def gain(self) -> Floats:
+        """(C,) log likelihood gain [nat]; -inf for a hypothesis that a demonstration violates."""
+        return self.ranking.gain
+
+    @property
+    def order(self) -> Ints:
+        """(C,) hypotheses from the most likely to the least."""
+        return self.ranking.order
+
+    @property
+    def posterior(self) -> Floats:
+        """(C,) probability of each being the one constraint."""
+        return self.ranking.posterior
+
+    @property
+    def posterior_none(self) -> float:
+        """Probability that there is no constraint."""
+        return self.ranking.posterior_none
+
+    def of(self, demonstrations: ArrayLike | slice) -> Inference:
+        """The inference from some of the demonstrations, by their numbers."""
+        part = demonstrations if isinstance(demonstrations, slice) else np.asarray(demonstrations)
+        return replace(
+            self,
+            names=tuple(np.array(self.names, dtype=object)[part]),
+            phi=self.phi[part],
+            violated=self.violated[part],
+            reachable=self.reachable[part],
+        )
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader should know before believing the ranking."""
+        found = []
+        if lost := [name for name, can in zip(self.names, self.reachable, strict=True) if not can]:
+            found.append(
+                f"the tabular model cannot reach the goal of {', '.join(lost)}: evidence against "
+                "what they violate, and for nothing"
+            )
+        if unavoidable := np.flatnonzero(self.gain == np.inf).tolist():
+            names = ", ".join(self.hypotheses.names[i] for i in unavoidable)
+            found.append(f"some tabular agent cannot avoid {names}: their gain is infinite")
+        return found
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row a hypothesis, the most likely first: its bounds with units, and what is inferred.
+
+        Returns:
+            `hypothesis`, its name; for each dimension that some hypothesis bounds, `<name> from
+            [unit]` and `<name> to [unit]`; `rank`, `gain` [nat], `posterior`, and `violated_by`,
+            the number of demonstrations.
+        """
+        space, columns = self.hypotheses.space, {"hypothesis": np.array(self.hypotheses.names)}
+        for d, (name, unit) in enumerate(zip(space.names, space.units, strict=True)):
+            lower, upper = self.hypotheses.lower[:, d], self.hypotheses.upper[:, d]
+            if np.any(np.isfinite(lower)):
+                in_unit = f" [{unit}]" if unit else ""
+                columns |= {f"{name} from{in_unit}": lower, f"{name} to{in_unit}": upper}
+        columns |= {
+            "rank": self.ranking.rank,
+            "gain": self.gain,
+            "posterior": self.posterior,
+            "violated_by": np.sum(self.violated, axis=0),
+        }
+        return pd.DataFrame(columns).iloc[self.order].reset_index(drop=True)
+
+    def summary(self, rows: int = _ROWS_OF_SUMMARY) -> str:
+        """What was inferred, in a few lines: the most likely hypotheses, and warnings."""
+        table = self.to_frame().head(rows).to_string(index=False, float_format="{:.3g}".format)
+        return "\n".join(
+            [
+                f"{len(self.names)} demonstrations, {len(self.hypotheses)} hypotheses; probability "
+                f"of no constraint {self.posterior_none:.3g}",
+                table,
+                *(f"warning: {warning}" for warning in self.warnings),
+            ]
+        )
+
+    def __repr__(self) -> str:
+        return self.summary(_ROWS_OF_REPR)
 
 
-def posterior(
-    gain: ArrayLike, prior_none: float = 0.5, prior: ArrayLike | None = None
-) -> tuple[Floats, float]:
-    """Exact posterior under "at most one constraint", replacing (12) where MLCI chose among C.
+@dataclass(frozen=True, eq=False)
+class PreparedInference:
+    """What the ranking needs of N tasks that are known before anybody moves; made by `prepare`.
 
-    P(C_i | D) = pi_i e^(L_i) / (pi_0 + sum_k pi_k e^(L_k)), and e^(-inf) = 0 for the infeasible.
-    An infinite gain takes all the probability; several share it by their priors.
-
-    Args:
-        gain: (C,) L_i, -inf where infeasible.
-        prior_none: pi_0, in (0, 1].
-        prior: (C,) weights of the hypotheses, scaled to add up to 1 - pi_0; equal by default.
-
-    Returns:
-        (C,) P(C_i | D), and P(no constraint | D).
+    Attributes:
+        tasks: the N tasks.
+        hypotheses: the C hypotheses.
+        phi: (N, C) violation probabilities without a constraint; 0 where not reachable.
+        reachable: (N,) whether the tabular model can do the task.
 
     Raises:
-        ValueError: a prior outside its range.
+        ValueError: shapes that disagree.
     """
-    gain = np.asarray(gain, dtype=float)
-    weights = np.ones(gain.shape) if prior is None else np.asarray(prior, dtype=float)
-    if not 0 < prior_none <= 1:
-        raise ValueError(f"the prior of no constraint must lie in (0, 1], not {prior_none}")
-    if weights.shape != gain.shape or np.any(weights < 0) or not np.sum(weights) > 0:
-        raise ValueError(f"the prior needs {gain.shape} weights >= 0 that are not all 0")
-    share = (1 - prior_none) * weights / np.sum(weights)
-    certain = (gain == np.inf) & (share > 0)
-    if np.any(certain):
-        return np.where(certain, share, 0.0) / np.sum(share[certain]), 0.0
-    with np.errstate(divide="ignore"):
-        log_weight = np.append(np.log(share) + gain, np.log(prior_none))
-    chance = np.exp(log_weight - logsumexp(log_weight))
-    return chance[:-1], float(chance[-1])
+
+    tasks: tuple[Task, ...]
+    hypotheses: Regions
+    phi: Floats
+    reachable: Bools
+
+    def __post_init__(self) -> None:
+        shape = len(self.tasks), len(self.hypotheses)
+        if self.phi.shape != shape or self.reachable.shape != shape[:1]:
+            raise ValueError(
+                f"phi {self.phi.shape} and reachable {self.reachable.shape} do not fit {shape[0]} "
+                f"tasks and {shape[1]} hypotheses"
+            )
+
+    def infer(
+        self,
+        paths: Sequence[ArrayLike],
+        tasks: Sequence[int] | None = None,
+        *,
+        names: Sequence[str] = (),
+        prior_none: float = 0.5,
+    ) -> Inference:
+        """Rank the hypotheses by the demonstrations that have arrived, equations (4) to (6).
+
+        Args:
+            paths: states (K+1, n) of each demonstration.
+            tasks: the number of each demonstration's task, in any order and as often as it was
+                done; by default each task was done once, in order.
+            names: of the demonstrations; their numbers by default.
+            prior_none: prior probability that there is no constraint.
+
+        Raises:
+            ValueError: a task that is not known, or not one task and name for each path.
+        """
+        numbers = np.arange(len(self.tasks)) if tasks is None else np.asarray(tasks, dtype=np.int64)
+        labels = tuple(names) or tuple(map(str, range(len(paths))))
+        if numbers.shape != (len(paths),) or len(labels) != len(paths):
+            raise ValueError(
+                f"{len(paths)} paths need as many tasks and names, not {numbers.tolist()} and "
+                f"{list(labels)}"
+            )
+        if np.any((numbers < 0) | (numbers >= len(self.tasks))):
+            raise ValueError(
+                f"tasks are numbered 0 to {len(self.tasks) - 1}, not {numbers.tolist()}"
+            )
+        return Inference(
+            self.hypotheses,
+            labels,
+            self.phi[numbers],
+            _violations(self.hypotheses, paths),
+            self.reachable[numbers],
+            prior_none,
+        )
 
 
-def confidence(prior: float, phi: ArrayLike) -> float:
-    """(12), corrected: P(C | A_N) = p / (p + (1 - p) prod_j (1 - Phi^j)).
-
-    For one hypothesis that was fixed before the demonstrations were seen, and that none of them
-    violates; the best of many needs `posterior`.
+def infer(
+    model: TabularModel,
+    demonstrations: Sequence[Demonstration],
+    *,
+    hypotheses: ArrayLike | None = None,
+    prior_none: float = 0.5,
+    round_horizon: bool = False,
+    n_jobs: int = 1,
+    progress: Progress | None = None,
+) -> Inference:
+    """Rank hypotheses by demonstrations, equations (4) to (6).
 
     Args:
-        prior: p, the probability that the constraint is there.
-        phi: (N,) its violation probability for each demonstration.
+        model: the tabular model.
+        demonstrations: N demonstrations, each with a task of its own.
+        hypotheses: (C,) mask over the model's regions; None takes all.
+        prior_none: prior probability that there is no constraint.
+        round_horizon: take the nearest number of time steps where dt does not divide a duration.
+        n_jobs: tasks that are worked on at once; -1 is one a core. The result is the same.
+        progress: called with how many tasks are done, and of how many.
+
+    Raises:
+        ValueError: a start outside the state space, a duration that dt does not divide, or a mask
+            of the wrong shape.
     """
-    if not 0 <= prior <= 1:
-        raise ValueError(f"a prior probability lies in [0, 1], not {prior}")
-    if prior == 0:
-        return 0.0
-    coincidence = float(np.exp(-np.sum(log_likelihood_gain(phi))))
-    return prior / (prior + (1 - prior) * coincidence)
+    prepared = prepare(
+        model,
+        [demonstration.task for demonstration in demonstrations],
+        hypotheses=hypotheses,
+        round_horizon=round_horizon,
+        n_jobs=n_jobs,
+        progress=progress,
+    )
+    paths = [demonstration.states for demonstration in demonstrations]
+    names = [
+        demonstration.name or str(number) for number, demonstration in enumerate(demonstrations)
+    ]
+    return prepared.infer(paths, names=names, prior_none=prior_none)
 
 
-def printed_confidence(prior: float, phi: ArrayLike) -> float:
-    """(12) as it is printed: p / (p - (1 - p) prod_j (1 - Phi^j)); wrong, for comparison only.
+def prepare(
+    model: TabularModel,
+    tasks: Sequence[Task],
+    *,
+    hypotheses: ArrayLike | None = None,
+    round_horizon: bool = False,
+    n_jobs: int = 1,
+    progress: Progress | None = None,
+) -> PreparedInference:
+    """Do beforehand whatever of the inference depends on the tasks alone; arguments as of `infer`.
 
-    It exceeds 1 wherever it is positive, grows without bound as the product comes near p / (1 - p),
-    and is negative beyond. `confidence` is what must be meant.
-
-    Args:
-        prior: p, the probability that the constraint is there.
-        phi: (N,) its violation probability for each demonstration.
-
-    Returns:
-        What the formula gives; infinite where it divides by 0.
+    Raises:
+        ValueError: as of `infer`.
     """
-    if not 0 <= prior <= 1:
-        raise ValueError(f"a prior probability lies in [0, 1], not {prior}")
-    coincidence = float(np.exp(-np.sum(log_likelihood_gain(phi))))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.float64(prior) / (prior - (1 - prior) * coincidence))
+    count = len(model.regions)
+    mask = np.ones(count, dtype=bool) if hypotheses is None else as_mask(hypotheses, count)
+    distributions = [
+        TrajectoryDistribution.of_task(model, task, round_horizon=round_horizon) for task in tasks
+    ]
+    phi, reachable = np.zeros((len(tasks), count)), np.zeros(len(tasks), dtype=bool)
+    if tasks:
+        _ = model.merged  # once for all tasks and processes
+    work = Parallel(n_jobs=n_jobs, return_as="generator")(
+        delayed(_violation_probabilities)(distribution) for distribution in distributions
+    )
+    for j, (is_possible, probabilities) in enumerate(work):
+        reachable[j], phi[j] = is_possible, probabilities
+        if progress is not None:
+            progress(j + 1, len(tasks))
+    return PreparedInference(tuple(tasks), model.regions.select(mask), phi[:, mask], reachable)
+
+
+def _violation_probabilities(distribution: TrajectoryDistribution) -> tuple[bool, Floats]:
+    """Whether a task can be done, and Phi (C,) of it, 0 if it cannot."""
+    if distribution.is_possible:
+        return True, distribution.violation_probabilities()
+    return False, np.zeros(len(distribution.model.regions))
+
+
+def _violations(hypotheses: Regions, paths: Sequence[ArrayLike]) -> Bools:
+    """D (N, C): which hypotheses each path violates."""
+    violated = np.zeros((len(paths), len(hypotheses)), dtype=bool)
+    if len({np.shape(path) for path in paths}) == 1:  # all at once is quicker
+        violated[:] = hypotheses.violated_by(np.stack(paths))
+    else:
+        for row, path in zip(violated, paths, strict=True):
+            row[:] = hypotheses.violated_by(path)
+    return violated

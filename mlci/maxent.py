@@ -8,102 +8,181 @@ be reached from the start in t moves, and so wherever no probability ever is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 
-from mlci.spaces import Bools, Floats, Ints
-from mlci.tabular import Progress, TabularMDP
+from mlci.demonstrations import Task
+from mlci.simulate import step_count
+from mlci.spaces import Floats, Ints
+from mlci.tabular import TabularModel
 
 _CELLS_AT_ONCE = 1 << 12  # whose moves a step of work holds
+_UNEVEN = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
 PHI_BYTES = 1 << 29  # of violation probabilities held at once, else regions go block by block
 
 
-def reachable(mdp: TabularMDP, start: int, steps: int) -> list[Ints]:
+@dataclass(frozen=True, eq=False)
+class TrajectoryDistribution:
+    """(2) for one task, or (3) on a model under a truth: `TabularModel.under`.
+
+    Attributes:
+        model: the tabular model.
+        start: start cell.
+        goal: (G,) goal cells: a trajectory ends in any of them. None makes the goal unreachable.
+        steps: T.
+
+    Raises:
+        ValueError: a start or a goal that is no cell, such as the -1 of a state outside the grid,
+            or less than one step.
+    """
+
+    model: TabularModel
+    start: int
+    goal: Ints
+    steps: int
+
+    def __post_init__(self) -> None:
+        goal, last = np.atleast_1d(np.asarray(self.goal)), self.model.states - 1
+        if not 0 <= self.start <= last:
+            raise ValueError(f"the start must be a cell from 0 to {last}, not {self.start}")
+        if goal.size and not (goal.min() >= 0 and goal.max() <= last):
+            raise ValueError(f"goals must be cells from 0 to {last}, not {goal.tolist()}")
+        if self.steps < 1:
+            raise ValueError(f"a trajectory needs at least one step, not {self.steps}")
+        object.__setattr__(self, "start", int(self.start))
+        object.__setattr__(self, "goal", np.unique(goal.astype(np.int64)))
+
+    @classmethod
+    def of_task(
+        cls, model: TabularModel, task: Task, *, round_horizon: bool = False
+    ) -> TrajectoryDistribution:
+        """The distribution of a task: from the cell of its start into the cells of its goal.
+
+        Args:
+            model: the tabular model.
+            task: the task.
+            round_horizon: take the nearest number of time steps where dt does not divide the
+                horizon.
+
+        Raises:
+            ValueError: a start outside the state space, or a horizon that dt does not divide (to a
+                thousandth of a step, as recorded times are rounded).
+        """
+        start = int(model.grid.index(task.start))
+        if start < 0:
+            raise ValueError(f"the start {task.start} lies outside the state space")
+        steps = max(1, round(task.horizon / model.dt))
+        if not round_horizon:
+            steps = step_count(task.horizon, model.dt, _UNEVEN)
+        return cls(model, start, model.grid.cells_in(task.goal), steps)
+
+    @cached_property
+    def log_z(self) -> Floats:
+        """(T+1, S) log Z to go [nat], by the soft Bellman backup; log_z[0, start] is log Z."""
+        cells = reachable_cells(self.model, self.start, self.steps)
+        return _soft_bellman_backup(self.model, cells, self.goal)
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether any trajectory from the start reaches a goal: else there is no distribution."""
+        return bool(self.log_z[0, self.start] > -np.inf)
+
+    def policy(self, t: int) -> tuple[Ints, Floats]:
+        """pi_t(move | s) = exp(reward + log_z[t+1, s'] - log_z[t, s]), the soft optimal policy.
+
+        Returns:
+            The cells (Q,) that carry probability at step t, and (Q, M) probabilities of their
+            moves, whose rows sum to 1.
+        """
+        cells = np.flatnonzero(self.log_z[t] > -np.inf)
+        return cells, _move_probabilities(self.model, self.log_z, t, cells)
+
+    def violation_probabilities(self) -> Floats:
+        """Phi_(i,T) (C,): the probability that a trajectory crosses region i.
+
+        phi_t^i(s) = sum over moves of pi_t(move | s) [1 if the move crosses i, else
+        phi_(t+1)^i(s')], backwards from phi_T = 0. Computed as sum of pi_t phi_(t+1)^i(s') over all
+        moves, those with one successor merged, and then pi_t (1 - phi_(t+1)^i(s')) added for each
+        move that crosses i: all terms are at least 0, so nothing cancels.
+
+        Raises:
+            ValueError: no trajectory reaches a goal.
+        """
+        self._require_possible("Phi is not defined")
+        regions = len(self.model.regions)
+        support = int(np.max(np.sum(self.log_z > -np.inf, axis=1)))
+        blocks = min(regions, -(-regions * 2 * 8 * support // PHI_BYTES))
+        edges = np.linspace(0, regions, max(1, blocks) + 1).astype(int)
+        phi = np.empty(regions)
+        for first, last in pairwise(edges):
+            phi[first:last] = _phi_of_regions(self.model, self.log_z, first, last)
+        return np.minimum(phi, 1.0)
+
+    def sample(self, count: int, rng: np.random.Generator) -> tuple[Ints, Ints]:
+        """Draw trajectories by following the soft optimal policy.
+
+        Returns:
+            (count, T+1) cells and (count, T) moves.
+
+        Raises:
+            ValueError: no trajectory reaches a goal.
+        """
+        self._require_possible("nothing to sample")
+        cells = [np.full(count, self.start, dtype=np.int64)]
+        moves = []
+        for t in range(self.steps):
+            here, place = np.unique(cells[-1], return_inverse=True)
+            probabilities = _move_probabilities(self.model, self.log_z, t, here)
+            cumulative = np.cumsum(probabilities[place], axis=1)
+            # Scaled by the last entry, so that rounding cannot lift a draw past every move.
+            draws = rng.random(count)[:, None] * cumulative[:, -1:]
+            moves.append(np.argmax(cumulative > draws, axis=1))
+            cells.append(self.model.successor[cells[-1], moves[-1]])
+        return np.stack(cells, axis=1), np.stack(moves, axis=1)
+
+    def _require_possible(self, consequence: str) -> None:
+        """Raise where there is no distribution."""
+        if not self.is_possible:
+            raise ValueError(f"no trajectory from cell {self.start} reaches a goal: {consequence}")
+
+
+def reachable_cells(model: TabularModel, start: int, steps: int) -> list[Ints]:
     """Cells that can be occupied after t = 0 .. steps allowed moves from a start cell."""
-    cells = [np.array([start], dtype=np.int64)]
+    merged, cells = model.merged, [np.array([start], dtype=np.int64)]
     for _ in range(steps):
-        way, _ = _ways_of(mdp, cells[-1])
-        mark = np.zeros(mdp.states, dtype=bool)
-        mark[mdp.ways.successor[way[mdp.ways.log_weight[way] > -np.inf]]] = True
+        move, _ = _ranges(merged.begins, cells[-1])
+        mark = np.zeros(model.states, dtype=bool)
+        mark[merged.successor[move[merged.log_weight[move] > -np.inf]]] = True
         cells.append(np.flatnonzero(mark))
     return cells
 
 
-def log_partition(mdp: TabularMDP, start: int, goals: ArrayLike, steps: int) -> Floats:
-    """The soft Bellman backup: log Z of (2), or of (3) on `forbid(mdp, regions)`.
-
-    Args:
-        mdp: the MDP.
-        start: start cell.
-        goals: one goal cell, or several: the trajectory ends in any of them.
-        steps: T.
-
-    Returns:
-        (T+1, S) log_z; log_z[0, start] is log Z, -inf if no trajectory reaches a goal.
-
-    Raises:
-        ValueError: a start that is no cell, such as the -1 of a state outside the grid.
-    """
-    if not 0 <= start < mdp.states:
-        raise ValueError(f"the start must be a cell from 0 to {mdp.states - 1}, not {start}")
-    cells = reachable(mdp, start, steps)
-    log_z = np.full((steps + 1, mdp.states), -np.inf)
-    ends = np.intersect1d(cells[steps], np.atleast_1d(goals))
-    log_z[steps, ends] = 0.0
+def _soft_bellman_backup(model: TabularModel, cells: list[Ints], goal: Ints) -> Floats:
+    """log_z (T+1, S), backwards from the goal over the cells that can be occupied at each step."""
+    merged, steps = model.merged, len(cells) - 1
+    log_z = np.full((steps + 1, model.states), -np.inf)
+    log_z[steps, np.intersect1d(cells[steps], goal)] = 0.0
     for t in reversed(range(steps)):
-        for here in _parts(mdp, cells[t]):
-            way, ends = _ways_of(mdp, here)
-            value = mdp.ways.log_weight[way] + log_z[t + 1, mdp.ways.successor[way]]
+        for here in _parts(model, cells[t]):
+            move, ends = _ranges(merged.begins, here)
+            value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
             best = np.maximum.reduceat(value, ends[:-1])
             finite = best > -np.inf
             shift = np.repeat(np.where(finite, best, 0.0), np.diff(ends))
-            spread = np.add.reduceat(np.exp(value - shift), ends[:-1])
-            log_z[t, here[finite]] = best[finite] + np.log(spread[finite])
+            total = np.add.reduceat(np.exp(value - shift), ends[:-1])
+            log_z[t, here[finite]] = best[finite] + np.log(total[finite])
     return log_z
 
 
-def policy(mdp: TabularMDP, log_z: Floats, t: int) -> tuple[Ints, Floats]:
-    """pi_t(move | s) = exp(reward + log_z[t+1, s'] - log_z[t, s]), the soft optimal policy.
-
-    Returns:
-        The cells (Q,) that carry probability at step t, and (Q, M) probabilities of their moves,
-        whose rows sum to 1.
-    """
-    cells = np.flatnonzero(log_z[t] > -np.inf)
-    return cells, _chances(mdp, log_z, t, cells)
-
-
-def violation_probabilities(mdp: TabularMDP, log_z: Floats, start: int) -> Floats:
-    """Phi_(i,T) (C,): the probability that a trajectory from `start` crosses region i.
-
-    phi_t^i(s) = sum over moves of pi_t(move | s) [1 if the move crosses i, else phi_(t+1)^i(s')],
-    backwards from phi_T = 0. Computed as sum of pi_t phi_(t+1)^i(s') over all moves, those with
-    one successor merged, and then pi_t (1 - phi_(t+1)^i(s')) added for each move that crosses i:
-    all terms are at least 0, so nothing cancels.
-
-    Raises:
-        ValueError: no trajectory from `start` reaches a goal, so there is no distribution.
-    """
-    if log_z[0, start] == -np.inf:
-        raise ValueError(f"no trajectory from cell {start} reaches a goal: Phi is not defined")
-    regions = mdp.crosses.shape[1]
-    support = int(np.max(np.sum(log_z > -np.inf, axis=1)))
-    blocks = min(regions, -(-regions * 2 * 8 * support // PHI_BYTES))
-    edges = np.linspace(0, regions, max(1, blocks) + 1).astype(int)
-    phi = np.empty(regions)
-    for first, last in pairwise(edges):
-        phi[first:last] = _block_of_phi(mdp, log_z, first, last)
-    return np.minimum(phi, 1.0)
-
-
-def _block_of_phi(mdp: TabularMDP, log_z: Floats, first: int, last: int) -> Floats:
+def _phi_of_regions(model: TabularModel, log_z: Floats, first: int, last: int) -> Floats:
     """Phi of the regions from `first` to before `last`, of the one cell that log_z starts in."""
-    ways, steps = mdp.ways, len(log_z) - 1
-    row_of = np.zeros(mdp.states, dtype=np.int64)
+    steps = len(log_z) - 1
+    row_of = np.zeros(model.states, dtype=np.int64)
     cells_after = np.flatnonzero(log_z[steps] > -np.inf)
     phi = np.zeros((len(cells_after), last - first))
     for t in reversed(range(steps)):
@@ -112,30 +191,42 @@ def _block_of_phi(mdp: TabularMDP, log_z: Floats, first: int, last: int) -> Floa
         cells = np.flatnonzero(log_z[t] > -np.inf)
         phi_after, phi = phi, np.empty((len(cells), last - first))
         row = 0
-        for here in _parts(mdp, cells):
-            way, ends = _ways_of(mdp, here)
-            column = row_of[ways.successor[way]]
-            value = ways.log_weight[way] + log_z[t + 1, ways.successor[way]]
-            chance = np.exp(value - np.repeat(log_z[t, here], np.diff(ends)))
-            chance /= np.repeat(np.add.reduceat(chance, ends[:-1]), np.diff(ends))
-            # A successor outside the support has probability 0: whichever row stands for it.
-            column = np.maximum(column, 0)
-            moved = sparse.csr_matrix((chance, column, ends), shape=(len(here), len(cells_after)))
-            now = moved @ phi_after
-            owner, entry, region = _of_cells(
-                ways.crossing_begins, ways.crossing_region, here, first, last
-            )
-            place = ways.crossing_way[entry] - ways.begins[here[owner]] + ends[owner]
-            lacking = chance[place] * (1.0 - phi_after[column[place], region])
-            np.add.at(now.reshape(-1), owner * (last - first) + region, lacking)
-            owner, _, region = _of_cells(
-                ways.certain_begins, ways.certain_region, here, first, last
-            )
-            now[owner, region] = 1.0
-            phi[row : row + len(here)] = now
+        for here in _parts(model, cells):
+            now = phi[row : row + len(here)]
+            now[:] = _phi_one_step_back(model, log_z, t, here, row_of, phi_after, first)
             row += len(here)
         cells_after = cells
     return phi[0]
+
+
+def _phi_one_step_back(
+    model: TabularModel,
+    log_z: Floats,
+    t: int,
+    cells: Ints,
+    row_of: Ints,
+    phi_after: Floats,
+    first: int,
+) -> Floats:
+    """phi_t (Q, C') of some cells, from phi_(t+1) (Q', C'), whose rows `row_of` (S,) gives."""
+    merged, last = model.merged, first + phi_after.shape[1]
+    move, ends = _ranges(merged.begins, cells)
+    value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
+    probability = np.exp(value - np.repeat(log_z[t, cells], np.diff(ends)))
+    probability /= np.repeat(np.add.reduceat(probability, ends[:-1]), np.diff(ends))
+    # A successor outside the support has probability 0: whichever row stands for it.
+    column = np.maximum(row_of[merged.successor[move]], 0)
+    shape = len(cells), len(phi_after)
+    phi = sparse.csr_matrix((probability, column, ends), shape=shape) @ phi_after
+    owner, entry, region = _of_cells(
+        merged.crossing_begins, merged.crossing_region, cells, first, last
+    )
+    place = merged.crossing_move[entry] - merged.begins[cells[owner]] + ends[owner]
+    lacking = probability[place] * (1.0 - phi_after[column[place], region])
+    np.add.at(phi.reshape(-1), owner * (last - first) + region, lacking)
+    owner, _, region = _of_cells(merged.certain_begins, merged.certain_region, cells, first, last)
+    phi[owner, region] = 1.0
+    return phi
 
 
 def _of_cells(
@@ -148,78 +239,18 @@ def _of_cells(
     entry, ends = _ranges(begins, cells)
     owner = np.repeat(np.arange(len(cells)), np.diff(ends))
     region = regions[entry] - first
-    wanted = (region >= 0) & (region < last - first)
-    if wanted.all():
+    inside = (region >= 0) & (region < last - first)
+    if inside.all():
         return owner, entry, region
-    return owner[wanted], entry[wanted], region[wanted]
+    return owner[inside], entry[inside], region[inside]
 
 
-def expected_violations(
-    mdp: TabularMDP,
-    starts: Sequence[int],
-    goals: Sequence[ArrayLike],
-    steps: Sequence[int],
-    progress: Progress | None = None,
-) -> tuple[Floats, Bools]:
-    """Phi of several tasks.
-
-    Args:
-        mdp: the MDP.
-        starts: N start cells.
-        goals: N goals, each a cell or several.
-        steps: N numbers of transitions.
-        progress: is told how many tasks are done, and of how many.
-
-    Returns:
-        (N, C) violation probabilities, 0 where the goal cannot be reached; and (N,) whether it can.
-    """
-    phi = np.zeros((len(starts), mdp.crosses.shape[1]))
-    reached = np.zeros(len(starts), dtype=bool)
-    for j, (start, goal, count) in enumerate(zip(starts, goals, steps, strict=True)):
-        log_z = log_partition(mdp, start, goal, count)
-        reached[j] = log_z[0, start] > -np.inf
-        if reached[j]:
-            phi[j] = violation_probabilities(mdp, log_z, start)
-        if progress is not None:
-            progress(j + 1, len(starts))
-    return phi, reached
-
-
-def sample_moves(
-    mdp: TabularMDP, log_z: Floats, start: int, count: int, rng: np.random.Generator
-) -> tuple[Ints, Ints]:
-    """Draw trajectories from (2) by following the soft optimal policy.
-
-    Returns:
-        (count, T+1) cells and (count, T) moves.
-
-    Raises:
-        ValueError: no trajectory from `start` reaches a goal.
-    """
-    if log_z[0, start] == -np.inf:
-        raise ValueError(f"no trajectory from cell {start} reaches a goal: nothing to sample")
-    cells = [np.full(count, start, dtype=np.int64)]
-    moves = []
-    for t in range(len(log_z) - 1):
-        here, place = np.unique(cells[-1], return_inverse=True)
-        cumulative = np.cumsum(_chances(mdp, log_z, t, here)[place], axis=1)
-        # Scaled by the last entry, so that rounding cannot lift a draw past every move.
-        draws = rng.random(count)[:, None] * cumulative[:, -1:]
-        moves.append(np.argmax(cumulative > draws, axis=1))
-        cells.append(mdp.successor[cells[-1], moves[-1]])
-    return np.stack(cells, axis=1), np.stack(moves, axis=1)
-
-
-def _parts(mdp: TabularMDP, cells: Ints) -> Iterator[Ints]:
-    """Cells that some way leaves, in parts whose ways fit into memory and cache."""
-    left = cells[mdp.ways.begins[cells + 1] > mdp.ways.begins[cells]]
+def _parts(model: TabularModel, cells: Ints) -> Iterator[Ints]:
+    """Cells that some move leaves, in parts whose moves fit into memory and cache."""
+    begins = model.merged.begins
+    left = cells[begins[cells + 1] > begins[cells]]
     for first in range(0, len(left), _CELLS_AT_ONCE):
         yield left[first : first + _CELLS_AT_ONCE]
-
-
-def _ways_of(mdp: TabularMDP, cells: Ints) -> tuple[Ints, Ints]:
-    """The ways of some cells, one cell after the other, and (Q+1,) where those of each begin."""
-    return _ranges(mdp.ways.begins, cells)
 
 
 def _ranges(begins: Ints, cells: Ints) -> tuple[Ints, Ints]:
@@ -229,13 +260,9 @@ def _ranges(begins: Ints, cells: Ints) -> tuple[Ints, Ints]:
     return np.arange(ends[-1]) + np.repeat(begins[cells] - ends[:-1], counts), ends
 
 
-def _chances(mdp: TabularMDP, log_z: Floats, t: int, cells: Ints) -> Floats:
+def _move_probabilities(model: TabularModel, log_z: Floats, t: int, cells: Ints) -> Floats:
     """(Q, M) probabilities of the moves of cells that carry probability at step t."""
-    chances = np.exp(_action_values(mdp, log_z[t + 1], cells) - log_z[t, cells, None])
-    return np.asarray(chances / np.sum(chances, axis=1, keepdims=True))
-
-
-def _action_values(mdp: TabularMDP, log_z_after: Floats, cells: Ints) -> Floats:
-    """(Q, M) reward + log_z[t+1, s'] of the moves of `cells`, -inf where not allowed."""
-    value = mdp.reward[cells] + log_z_after[mdp.successor[cells]]
-    return np.where(mdp.allowed[cells], value, -np.inf)
+    value = model.reward[cells] + log_z[t + 1, model.successor[cells]]
+    value = np.where(model.allowed[cells], value, -np.inf)
+    probabilities = np.exp(value - log_z[t, cells, None])
+    return np.asarray(probabilities / np.sum(probabilities, axis=1, keepdims=True))

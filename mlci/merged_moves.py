@@ -1,14 +1,15 @@
-"""Moves of a tabular MDP that nothing tells apart, taken together.
+"""Moves of a cell with the same successor and crossings, merged.
 
-Moves of one cell that lead to the same successor and cross the same regions are alike for Z and for
-Phi: what counts is the sum of their e^reward. A *way* stands for all of them. There are far fewer
-ways than moves where a cell has many start points, and some fewer where it has one.
+For Z and Phi only the sum of their e^reward counts, so one *merged move* stands for all of them.
+There are far fewer merged moves than moves where a cell has many start points, and somewhat fewer
+where it has one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -17,18 +18,18 @@ from mlci.spaces import Bools, Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
-class Ways:
-    """The W ways of all cells, in order of cell, and the regions that they cross.
+class MergedMoves:
+    """The W merged moves of all cells, in order of cell, and the regions that they cross.
 
     Attributes:
         begins: (S+1,) those of cell s are begins[s] to begins[s+1].
-        successor: (W,) cell that a way leads to.
+        successor: (W,) cell that a merged move leads to.
         move: (W,) one of its moves, which crosses what the others cross.
         log_weight: (W,) log of the sum of e^reward over its moves [nat]; -inf if it is forbidden.
         crossing_begins: (S+1,) where each cell's crossings begin, of those that are not certain.
-        crossing_way: (E,) way of each.
-        crossing_region: (E,) region of each.
-        certain_begins: (S+1,) likewise of regions that all ways of a cell cross, as where the cell
+        crossing_move: (E,) merged move of each crossing.
+        crossing_region: (E,) region of each crossing.
+        certain_begins: (S+1,) likewise of regions that all moves of a cell cross, as where the cell
             lies inside.
         certain_region: (F,) these regions.
     """
@@ -38,13 +39,13 @@ class Ways:
     move: Ints
     log_weight: Floats
     crossing_begins: Ints
-    crossing_way: Ints
+    crossing_move: Ints
     crossing_region: Ints
     certain_begins: Ints
     certain_region: Ints
 
-    def without(self, crossed: Bools) -> Ways:
-        """These ways, but for those whose moves are `crossed` (S, M)."""
+    def without(self, crossed: Bools) -> MergedMoves:
+        """The same with those forbidden whose moves are `crossed` (S, M)."""
         cell = np.repeat(np.arange(len(crossed)), np.diff(self.begins))
         weight = np.where(crossed[cell, self.move], -np.inf, self.log_weight)
         return replace(self, log_weight=weight)
@@ -55,71 +56,88 @@ def merge_moves(
     reward: Floats,
     allowed: Bools,
     crosses: sparse.csr_matrix,
-    blocks: Iterator[slice],
-) -> Ways:
-    """Take together the allowed moves of each cell that nothing tells apart.
+    blocks: Iterable[slice],
+) -> MergedMoves:
+    """Merge the allowed moves of each cell that have one successor and cross the same regions.
 
     Args:
-        successor, reward, allowed: (S, M) as of a TabularMDP.
+        successor, reward, allowed: (S, M) as of a TabularModel.
         crosses: (S * M, C) which regions a move crosses.
         blocks: of cells, in order, whose moves are held at once.
     """
-    (states, moves), regions = successor.shape, crosses.shape[1]
-    counts = np.zeros((3, states + 1), dtype=np.int64)  # of ways, crossings, certain regions
-    parts: list[tuple[Ints | Floats, ...]] = []
-    first_way = 0
+    moves, regions = successor.shape[1], crosses.shape[1]
+    parts = []
     for block in blocks:
         ends = crosses.indptr[block.start * moves : block.stop * moves + 1]
         entries = crosses.indices[ends[0] : ends[-1]]
-        ends = ends - ends[0]
-        order, begins = _groups(successor[block], allowed[block], entries, ends)
-        flat = (order + np.arange(len(order))[:, None] * moves).ravel()  # row of `crosses`
-        first = np.flatnonzero(begins)
-        cell, move = np.divmod(flat[first], moves)
-        weights = np.where(allowed[block], reward[block], -np.inf).ravel()[flat]
-        # A crossing is that of a way's first move.
-        number = ends[flat[first] + 1] - ends[flat[first]]
-        way = np.repeat(np.arange(len(first)), number)
-        place = np.arange(len(way)) + np.repeat(
-            ends[flat[first]] - np.cumsum(number) + number, number
-        )
-        region = entries[place]
-        pair, which, times = np.unique(
-            cell[way] * regions + region, return_inverse=True, return_counts=True
-        )
-        of_cell = np.bincount(cell, minlength=len(order))
-        certain = times == of_cell[pair // regions]
-        open_ = ~certain[which]
-        after = slice(block.start + 1, block.stop + 1)
-        counts[0, after] = of_cell
-        counts[1, after] = np.bincount(cell[way[open_]], minlength=len(order))
-        counts[2, after] = np.bincount(pair[certain] // regions, minlength=len(order))
         parts.append(
-            (
-                successor[block].ravel()[flat[first]].astype(np.int32),
-                move.astype(np.min_scalar_type(moves)),
-                _log_sums(weights, first),
-                first_way + way[open_],
-                region[open_].astype(np.int32),
-                (pair[certain] % regions).astype(np.int32),
+            _merge_block(
+                successor[block], reward[block], allowed[block], entries, ends - ends[0], regions
             )
         )
-        first_way += len(first)
-    begins_of = np.cumsum(counts, axis=1)
-    leads, move_of, weight, way_of, region_of, certain_of = map(
-        np.concatenate, zip(*parts, strict=True)
+    return _concatenated(parts)
+
+
+def _merge_block(
+    successor: Ints, reward: Floats, allowed: Bools, entries: Ints, ends: Ints, regions: int
+) -> MergedMoves:
+    """The merged moves of some cells (Q, M); move k of them crosses entries[ends[k]:ends[k+1]]."""
+    cells, moves = successor.shape
+    order, begins = _groups(successor, allowed, entries, ends)
+    row = (order + np.arange(cells)[:, None] * moves).ravel()  # numbers of the moves, in order
+    first = np.flatnonzero(begins)  # of each merged move, the place of its first move in that order
+    cell, move = np.divmod(row[first], moves)
+    # What the first move crosses, all of a merged move cross.
+    count = ends[row[first] + 1] - ends[row[first]]
+    owner = np.repeat(np.arange(len(first)), count)
+    place = np.arange(len(owner)) + np.repeat(ends[row[first]] - np.cumsum(count) + count, count)
+    region = entries[place]
+    pair, which, times = np.unique(
+        cell[owner] * regions + region, return_inverse=True, return_counts=True
     )
-    return Ways(
-        begins_of[0],
-        leads,
-        move_of,
-        weight,
-        begins_of[1],
-        way_of,
-        region_of,
-        begins_of[2],
-        certain_of,
+    of_cell = np.bincount(cell, minlength=cells)
+    certain = times == of_cell[pair // regions]
+    uncertain = ~certain[which]
+    return MergedMoves(
+        begins=_begins(of_cell),
+        successor=successor.ravel()[row[first]].astype(np.int32),
+        move=move.astype(np.min_scalar_type(moves)),
+        log_weight=_log_sums(np.where(allowed, reward, -np.inf).ravel()[row], first),
+        crossing_begins=_begins(np.bincount(cell[owner[uncertain]], minlength=cells)),
+        crossing_move=owner[uncertain],
+        crossing_region=region[uncertain].astype(np.int32),
+        certain_begins=_begins(np.bincount(pair[certain] // regions, minlength=cells)),
+        certain_region=(pair[certain] % regions).astype(np.int32),
     )
+
+
+def _concatenated(parts: Sequence[MergedMoves]) -> MergedMoves:
+    """The merged moves of consecutive blocks of cells as those of all."""
+
+    def joined(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    def begins(name: str) -> Ints:
+        return _begins(np.concatenate([np.diff(getattr(part, name)) for part in parts]))
+
+    before = np.cumsum([0, *(len(part.successor) for part in parts)])
+    numbers = [part.crossing_move + start for part, start in zip(parts, before, strict=False)]
+    return MergedMoves(
+        begins=begins("begins"),
+        successor=joined("successor"),
+        move=joined("move"),
+        log_weight=joined("log_weight"),
+        crossing_begins=begins("crossing_begins"),
+        crossing_move=np.concatenate(numbers),
+        crossing_region=joined("crossing_region"),
+        certain_begins=begins("certain_begins"),
+        certain_region=joined("certain_region"),
+    )
+
+
+def _begins(counts: Ints) -> Ints:
+    """(Q+1,) where each of Q runs begins in an array of all, and where the last one ends."""
+    return np.append(0, np.cumsum(counts))
 
 
 def _groups(successor: Ints, allowed: Bools, entries: Ints, ends: Ints) -> tuple[Ints, Bools]:

@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import comb
 
-from mlci.grids import Grid
-from mlci.inference import log_likelihood_gain, rank_scores
+from mlci.evidence import log_likelihood_gain, rank_scores
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
-from mlci.systems import System
-from mlci.tabular import TabularMDP
-
-# A discretisation is questioned above these shares. In the paper's sweep of the pendulum the truth
-# is among the first 5 of most sets of 9 demonstrations where hardly a goal is out of reach, and of
-# few where a sixth or more are. The latter have a frozen share of 0.34 or more, the former of 0.13
-# or less, but for 5 actions on 1600 cells at 1 s: too few ways to go. Between these values the
-# thresholds are a choice. No grid of that sweep loses half of its moves.
-MOST_FROZEN, MOST_UNREACHABLE, MOST_LEAVING = 0.25, 0.05, 0.5
 
 
 def final_state_error(space: StateSpace, final: ArrayLike, goal: Box) -> Floats:
@@ -129,68 +118,3 @@ def _subset_gains(phi: ArrayLike, violated: ArrayLike, subsets: Ints) -> Floats:
     gain = np.sum(log_likelihood_gain(phi)[subsets], axis=1)
     refuted = np.any(np.asarray(violated, dtype=bool)[subsets], axis=1)
     return np.where(refuted, -np.inf, gain)
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """How well a grid and a time step suit a system, known before anything long runs.
-
-    Attributes:
-        stay: share of the moves that end in the cell they began in.
-        leave: share of the moves that leave the state space.
-        cells_crossed: mean number of cells that a move covers, in its fastest dimension.
-        frozen: for each dimension, the share of cells whose number in it no move changes.
-    """
-
-    stay: float
-    leave: float
-    cells_crossed: float
-    frozen: tuple[float, ...]
-
-    def concerns(self, names: Sequence[str], unreachable: int, tasks: int) -> list[str]:
-        """What is wrong with the discretisation and what to do about it; empty if nothing is.
-
-        Args:
-            names: (n,) the state's dimensions.
-            unreachable: tasks whose goal the tabular model cannot reach.
-            tasks: number of tasks.
-        """
-        found = [
-            f"in {share:.0%} of the cells no action changes the {name.replace('_', ' ')} cell "
-            "within a step, so the tabular agent hardly steers"
-            for share, name in zip(self.frozen, names, strict=True)
-            if share > MOST_FROZEN
-        ]
-        if unreachable > MOST_UNREACHABLE * tasks:
-            found.append(f"{unreachable} of {tasks} goals cannot be reached by the tabular agent")
-        if found:
-            frozen = max(self.frozen) > MOST_FROZEN
-            ways = "a longer time step, more cells" if frozen else "more actions, a shorter step"
-            found.append(f"remedy: {ways}, or start points averaged over the cell (samples=3)")
-        if self.leave > MOST_LEAVING:
-            found.append(
-                f"{self.leave:.0%} of the moves leave the state space: widen its bounds or take "
-                "a shorter time step"
-            )
-        return found
-
-
-def diagnose(system: System, grid: Grid, actions: Floats, dt: float, mdp: TabularMDP) -> Diagnosis:
-    """Measure how a discretisation moves; see `Diagnosis`."""
-    stays, crossed, changing = 0, 0.0, np.zeros(len(grid.shape))
-    for block in mdp.blocks():
-        own = np.arange(block.start, block.stop)[:, None]
-        speed = np.abs(system.dynamics(grid.centers[block, None, :], actions[None, :, :]))
-        crossed += float(np.sum(np.max(speed * dt / grid.widths, axis=-1)))
-        successor, allowed = mdp.successor[block], mdp.allowed[block]
-        stays += int(np.sum((successor == own) & allowed))
-        place = np.stack(np.unravel_index(np.maximum(successor, 0), grid.shape), axis=-1)
-        here = np.stack(np.unravel_index(own, grid.shape), axis=-1)
-        changing += np.sum(np.any((place != here) & allowed[..., None], axis=1), axis=0)
-    moves = int(np.sum(mdp.allowed))
-    return Diagnosis(
-        stay=stays / moves if moves else np.nan,
-        leave=(mdp.allowed.size - moves) / mdp.allowed.size,
-        cells_crossed=crossed / (grid.size * len(actions)),
-        frozen=tuple(float(share) for share in (grid.size - changing) / grid.size),
-    )

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlci.grids import Grid
-from mlci.regions import ConstraintSet
+from mlci.regions import Regions
 from mlci.spaces import Bools, Floats
 from mlci.systems import System
 
@@ -92,10 +92,10 @@ class SafeSet:
         return vertices[np.argmax(rates, axis=0)]
 
 
-def solve(
+def solve_safe_set(
     system: System,
     grid: Grid,
-    constraints: ConstraintSet,
+    constraints: Regions,
     *,
     horizon: float | None = None,
     tolerance: float = 1e-3,

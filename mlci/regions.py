@@ -1,4 +1,4 @@
-"""Sets of regions of the state space: constraint hypotheses and the ground truth alike.
+"""Named regions of the state space: constraint hypotheses and the ground truth alike.
 
 A path violates a region when it meets the region's interior: to touch an edge is not to enter.
 """
@@ -20,21 +20,24 @@ _CHORDS_AT_ONCE = 1 << 13  # C x 8 KiB of a crossing test stay in the second lev
 
 
 @dataclass(frozen=True, eq=False)
-class ConstraintSet:
+class Regions:
     """C boxes in a state space; they may overlap, need not cover it, and there may be none.
 
     Attributes:
         space: the state space.
         lower: (C, n) lower corners, -inf where a dimension is free.
         upper: (C, n) upper corners, +inf where a dimension is free.
+        names: (C,) name of each region, all different; by default its number, from "0".
 
     Raises:
-        ValueError: corners of the wrong shape, an empty box, a side with one infinite end.
+        ValueError: corners of the wrong shape, an empty box, a side with one infinite end, or names
+            that are too few, too many or not different.
     """
 
     space: StateSpace
     lower: Floats
     upper: Floats
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
@@ -50,20 +53,27 @@ class ConstraintSet:
                 f"region {first} needs lower < upper and both ends finite or neither: "
                 f"{lower[first].tolist()} to {upper[first].tolist()}"
             )
+        names = tuple(self.names) or _numbers(len(lower))
+        if len(names) != len(lower) or len(set(names)) < len(names):
+            raise ValueError(f"{len(lower)} regions need as many different names, not {names}")
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
+        object.__setattr__(self, "names", names)
 
     def __len__(self) -> int:
         return len(self.lower)
 
     @classmethod
-    def from_boxes(cls, space: StateSpace, boxes: Iterable[Box]) -> ConstraintSet:
+    def from_boxes(
+        cls, space: StateSpace, boxes: Iterable[Box], names: Sequence[str] = ()
+    ) -> Regions:
         """The regions listed, in their order."""
         corners = np.array([(box.lower, box.upper) for box in boxes])
-        return cls(space, *np.moveaxis(corners.reshape(-1, 2, space.dimension), 1, 0))
+        lower, upper = np.moveaxis(corners.reshape(-1, 2, space.dimension), 1, 0)
+        return cls(space, lower, upper, tuple(names))
 
     @classmethod
-    def from_grid(cls, space: StateSpace, shape: Sequence[int | None]) -> ConstraintSet:
+    def from_grid(cls, space: StateSpace, shape: Sequence[int | None]) -> Regions:
         """Equal cells over any subset of the dimensions: a None in `shape` leaves one free."""
         grid = Grid(space, tuple(1 if count is None else count for count in shape))
         lower, upper = grid.corners
@@ -74,13 +84,35 @@ class ConstraintSet:
         """Region `index` as a box."""
         return Box(self.lower[index], self.upper[index])
 
-    def joined(self, other: ConstraintSet) -> ConstraintSet:
-        """These regions, then the other's."""
-        return ConstraintSet(
+    def joined(self, other: Regions) -> Regions:
+        """These regions, then the other's.
+
+        Numbers go on where both sets are numbered; other names may not be in both.
+        """
+        numbered = all(regions.names == _numbers(len(regions)) for regions in (self, other))
+        return Regions(
             self.space,
             np.concatenate([self.lower, other.lower]),
             np.concatenate([self.upper, other.upper]),
+            () if numbered else self.names + other.names,
         )
+
+    def mask(self, names: Iterable[str]) -> Bools:
+        """(C,) which regions have one of these names.
+
+        Raises:
+            ValueError: a name that no region has.
+        """
+        asked = set(names)
+        if unknown := sorted(asked - set(self.names)):
+            raise ValueError(f"no region is named {', '.join(unknown)}")
+        return np.array([name in asked for name in self.names], dtype=bool)
+
+    def select(self, mask: ArrayLike) -> Regions:
+        """The regions where mask (C,) is true, in their order."""
+        chosen = as_mask(mask, len(self))
+        names = tuple(name for name, is_in in zip(self.names, chosen, strict=True) if is_in)
+        return Regions(self.space, self.lower[chosen], self.upper[chosen], names)
 
     def signed_distance(self, states: ArrayLike) -> Floats:
         """dist_K of the union (...,) at states (..., n): below 0 inside some region.
@@ -91,7 +123,7 @@ class ConstraintSet:
         each = [self.space.signed_distance(states, self.box(i)) for i in range(len(self))]
         return np.min([nowhere, *each], axis=0)
 
-    def inside(self, other: ConstraintSet) -> Bools:
+    def inside(self, other: Regions) -> Bools:
         """(C,) which regions lie entirely in one region of `other` (to 1e-9 of the bounds).
 
         What a region holds beyond the bounds of the state space does not count, and one that holds
@@ -109,7 +141,7 @@ class ConstraintSet:
             covered |= np.all(fits | all_round, axis=1)
         return covered & np.all(mine[1] - mine[0] > slack, axis=1)
 
-    def overlaps(self, other: ConstraintSet) -> Bools:
+    def overlaps(self, other: Regions) -> Bools:
         """(C,) which regions share more than an edge with some region of `other`.
 
         What is shared must be wider than 1e-9 of the bounds in each dimension.
@@ -245,3 +277,23 @@ class ConstraintSet:
                 copies.append((region[wanted], lower[wanted] + shift, upper[wanted] + shift))
             region, lower, upper = map(np.concatenate, zip(*copies, strict=True))
         return region, lower, upper
+
+
+def _numbers(count: int) -> tuple[str, ...]:
+    """The names of regions that are given none."""
+    return tuple(map(str, range(count)))
+
+
+def as_mask(mask: ArrayLike, count: int) -> Bools:
+    """A mask over regions (count,), checked.
+
+    Raises:
+        ValueError: it has another shape, or holds anything but truth values.
+    """
+    checked = np.asarray(mask)
+    if checked.dtype != bool or checked.shape != (count,):
+        raise ValueError(
+            f"a mask over {count} regions needs as many truth values, not {checked.dtype} of shape "
+            f"{checked.shape}; Regions.mask makes one from names"
+        )
+    return checked

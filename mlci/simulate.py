@@ -13,14 +13,19 @@ from mlci.systems import System
 Step = Callable[[System, Floats, Floats, float], Floats]
 
 
-def step_count(horizon: float, dt: float) -> int:
+def step_count(horizon: float, dt: float, tolerance: float = 1e-9) -> int:
     """T = horizon / dt, the number of transitions.
 
+    Args:
+        horizon: duration [s].
+        dt: time step [s].
+        tolerance: how far the horizon may be from a whole number of steps, as a share of one.
+
     Raises:
-        ValueError: dt does not divide the horizon (to 1e-9 of a step).
+        ValueError: dt does not divide the horizon.
     """
     steps = round(horizon / dt)
-    if steps < 1 or abs(steps * dt - horizon) > 1e-9 * dt:
+    if steps < 1 or abs(steps * dt - horizon) > tolerance * dt:
         raise ValueError(f"a time step of {dt} s does not divide the horizon of {horizon} s")
     return steps
 

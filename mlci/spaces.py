@@ -140,10 +140,10 @@ class StateSpace:
         return path - np.cumsum(turns, axis=-2)
 
     def contains(self, states: ArrayLike) -> Bools:
-        """Whether states (..., n) lie in the bounds; a periodic dimension has none."""
+        """Whether states (..., n) lie in the bounds; periodic dimensions take any finite value."""
         states = np.asarray(states)
         inside = (states >= self.bounds.lower) & (states <= self.bounds.upper)
-        return np.all(inside | self.periodic, axis=-1)
+        return np.all(inside | (self.periodic & np.isfinite(states)), axis=-1)
 
     def excess(self, states: ArrayLike, region: Box) -> Floats:
         """How far each dimension of states (..., n) is outside `region`: signed, 0 inside.
@@ -152,7 +152,7 @@ class StateSpace:
         is `difference(states, point)`.
         """
         states = np.asarray(states, dtype=float)
-        middle, half = _middle_and_half(region)
+        middle, half = middle_and_half(region)
         offset = np.where(np.isfinite(half), self.difference(states, middle), 0.0)
         return np.sign(offset) * np.maximum(np.abs(offset) - half, 0.0)
 
@@ -163,7 +163,7 @@ class StateSpace:
         free (infinite) dimension of the region, and a periodic one that it covers, do not count.
         """
         states = np.asarray(states, dtype=float)
-        middle, half = _middle_and_half(region)
+        middle, half = middle_and_half(region)
         counts = np.isfinite(half) & ~(self.periodic & (2 * half >= self.bounds.widths))
         if not np.any(counts):
             return np.full(states.shape[:-1], -np.inf)
@@ -172,8 +172,12 @@ class StateSpace:
         return outside + np.minimum(np.max(beyond, axis=-1), 0.0)
 
 
-def _middle_and_half(region: Box) -> tuple[Floats, Floats]:
-    """Centre (n,) and half widths (n,) of a region; 0 and inf where it is unbounded."""
+def middle_and_half(region: Box) -> tuple[Floats, Floats]:
+    """Centre (n,) and half widths (n,) of a region; 0 and inf where it is unbounded.
+
+    Raises:
+        ValueError: a side that is bounded at one end alone.
+    """
     bounded = np.isfinite(region.lower) & np.isfinite(region.upper)
     half_free = ~bounded & (np.isfinite(region.lower) | np.isfinite(region.upper))
     if np.any(half_free):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mlci.spaces import Box, Floats, StateSpace
 
@@ -69,6 +70,35 @@ def central_differences(system: System, states: Floats, controls: Floats) -> tup
         differ(states, lambda moved: system.dynamics(moved, controls)),
         differ(controls, lambda moved: system.dynamics(states, moved)),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionSystem(System):
+    """A system from a function that gives the rate of each dimension.
+
+    Attributes:
+        rates: takes states (..., n) and controls (..., m), and returns n rates, each (...,) or a
+            number, such as `lambda x, u: (x[..., 1], u[..., 0])`.
+        state_space: the state space.
+        control_range: (m,) range of the controls.
+    """
+
+    rates: Callable[[Floats, Floats], Sequence[ArrayLike]]
+    state_space: StateSpace
+    control_range: Box
+
+    @property
+    def space(self) -> StateSpace:
+        return self.state_space
+
+    @property
+    def control_box(self) -> Box:
+        return self.control_range
+
+    def dynamics(self, states: Floats, controls: Floats) -> Floats:
+        batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
+        rates = [np.broadcast_to(rate, batch) for rate in self.rates(states, controls)]
+        return np.stack(rates, axis=-1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,8 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from mlci.grids import Grid
-from mlci.merged_moves import Ways, merge_moves
-from mlci.regions import ConstraintSet
+from mlci.merged_moves import MergedMoves, merge_moves
+from mlci.regions import Regions, as_mask
 from mlci.simulate import rollout
 from mlci.spaces import Bools, Floats, Ints
 from mlci.systems import System
@@ -36,45 +36,61 @@ from mlci.systems import System
 _CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the curve it stands for
 _MOVES_AT_ONCE = 1 << 17  # what a step of long work holds beside its result: about 100 MB
 
-# Is told how many parts of long work are done, and of how many.
+# Called with how many parts of long work are done, and of how many.
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
-class TabularMDP:
-    """A deterministic tabular MDP that knows which regions its moves cross.
+class TabularModel:
+    """A deterministic tabular MDP, with the continuous system that it stands for.
+
+    It knows neither start nor goal nor truth: one model serves all tasks, and `under` adds a truth.
 
     Attributes:
+        system: the continuous system.
+        grid: the S cells.
+        actions: (A, m) controls, held for dt.
+        dt: time step [s].
+        regions: the C regions whose crossings are known: hypotheses, truths, or both.
         successor: (S, M) cell after a move; -1 where it leaves the grid.
         reward: (S, M) reward of a move, r dt / temperature [nat].
         allowed: (S, M) whether a move may be taken.
         crosses: (S * M, C) sparse boolean: row s * M + move, the regions its path enters.
-        action: (M,) index of the action that a move applies.
 
     Raises:
-        ValueError: arrays whose shapes disagree, or an allowed move without a successor.
+        ValueError: arrays whose shapes disagree, an allowed move without a successor, or a dt that
+            is not positive.
     """
 
+    system: System
+    grid: Grid
+    actions: Floats
+    dt: float
+    regions: Regions
     successor: Ints
     reward: Floats
     allowed: Bools
     crosses: sparse.csr_matrix
-    action: Ints
 
     def __post_init__(self) -> None:
         shape = self.successor.shape
         if not (
             len(shape) == 2
+            and shape[0] == self.grid.size
+            and shape[1] > 0
+            and shape[1] % len(self.actions) == 0
             and self.reward.shape == self.allowed.shape == shape
-            and self.action.shape == shape[1:]
-            and self.crosses.shape[0] == shape[0] * shape[1]
+            and self.crosses.shape == (shape[0] * shape[1], len(self.regions))
         ):
             raise ValueError(
-                f"successor {shape}, reward {self.reward.shape}, allowed {self.allowed.shape}, "
-                f"action {self.action.shape} and crosses {self.crosses.shape} do not agree"
+                f"{self.grid.size} cells, {len(self.actions)} actions, {len(self.regions)} "
+                f"regions, successor {shape}, reward {self.reward.shape}, allowed "
+                f"{self.allowed.shape} and crosses {self.crosses.shape} do not agree"
             )
         if np.any(self.allowed & ((self.successor < 0) | (self.successor >= shape[0]))):
             raise ValueError("a move that leads to no cell is marked as allowed")
+        if not self.dt > 0:
+            raise ValueError(f"a time step must be positive, not {self.dt} s")
 
     @property
     def states(self) -> int:
@@ -87,8 +103,13 @@ class TabularMDP:
         return int(self.successor.shape[1])
 
     @cached_property
-    def ways(self) -> Ways:
-        """The moves of each cell, those that nothing tells apart taken together."""
+    def action(self) -> Ints:
+        """(M,) index of the action that a move applies."""
+        return np.repeat(np.arange(len(self.actions)), self.moves // len(self.actions))
+
+    @cached_property
+    def merged(self) -> MergedMoves:
+        """The moves of each cell, those with the same successor and crossings merged."""
         return merge_moves(self.successor, self.reward, self.allowed, self.crosses, self.blocks())
 
     def blocks(self) -> Iterator[slice]:
@@ -96,6 +117,19 @@ class TabularMDP:
         size = max(1, _MOVES_AT_ONCE // self.moves)
         for first in range(0, self.states, size):
             yield slice(first, min(first + size, self.states))
+
+    def under(self, truth: ArrayLike) -> TabularModel:
+        """The model under constraints, equation (3): moves that cross the truth are not allowed.
+
+        Args:
+            truth: (C,) mask over the regions, such as `model.regions.mask(["c1"])`.
+        """
+        columns = np.flatnonzero(as_mask(truth, len(self.regions)))
+        crossed = np.asarray(self.crosses[:, columns].sum(axis=1)).reshape(self.allowed.shape) > 0
+        constrained = replace(self, allowed=self.allowed & ~crossed)
+        if "merged" in vars(self):  # what takes the time has been done
+            vars(constrained)["merged"] = self.merged.without(crossed)
+        return constrained
 
 
 def action_grid(system: System, counts: int | Sequence[int]) -> Floats:
@@ -110,12 +144,14 @@ def action_grid(system: System, counts: int | Sequence[int]) -> Floats:
         ValueError: a count below 1, or a list of the wrong length.
     """
     box = system.control_box
-    each = [counts] * box.dimension if isinstance(counts, int) else list(counts)
-    if len(each) != box.dimension or min(each) < 1:
-        raise ValueError(f"{box.dimension} controls need as many counts of at least 1, not {each}")
+    values = np.broadcast_to(counts, box.dimension) if np.ndim(counts) == 0 else np.array(counts)
+    if values.shape != (box.dimension,) or values.dtype.kind not in "iu" or np.min(values) < 1:
+        raise ValueError(
+            f"{box.dimension} controls need as many whole counts of at least 1, not {counts}"
+        )
     ticks = [
         np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2])
-        for low, high, count in zip(box.lower, box.upper, each, strict=True)
+        for low, high, count in zip(box.lower, box.upper, values.tolist(), strict=True)
     ]
     return np.stack([part.ravel() for part in np.meshgrid(*ticks, indexing="ij")], axis=-1)
 
@@ -125,12 +161,12 @@ def discretize(
     grid: Grid,
     actions: ArrayLike,
     dt: float,
-    regions: ConstraintSet,
+    regions: Regions,
     samples: int = 1,
     temperature: float = 1.0,
     progress: Progress | None = None,
-) -> TabularMDP:
-    """Form the tabular MDP of a continuous system, equation (1) and section IV-C.
+) -> TabularModel:
+    """Form the tabular model of a continuous system, equation (1) and section IV-C.
 
     Each move follows the true dynamics for dt. It is not allowed where its path leaves the state
     space, and it crosses every region that the path enters, ends included.
@@ -144,13 +180,13 @@ def discretize(
         samples: k; the moves of an action start at k^n points of the cell. 1 is the centre model,
             more the cell-averaged one (see the module's head).
         temperature: divides the reward (2).
-        progress: is told how many cells are done, and of how many.
+        progress: called with how many cells are done, and of how many.
     """
     actions = np.asarray(actions, dtype=float)
     substeps = substep_count(system, grid, actions, dt)
     points = samples ** len(grid.shape)
     shape = grid.size, len(actions) * points
-    applied = np.repeat(actions, points, axis=0)  # (M, m) the control of each move
+    control_of = np.repeat(actions, points, axis=0)  # (M, m) the control of each move
     successor, reward = np.empty(shape, dtype=np.int64), np.empty(shape)
     crosses = []
     size = max(1, _MOVES_AT_ONCE // (shape[1] * substeps))
@@ -158,37 +194,26 @@ def discretize(
         block = slice(first, min(first + size, grid.size))
         inside = grid.points_inside(samples, block)
         origin = np.tile(inside, (1, len(actions), 1)).reshape(-1, inside.shape[-1])
-        control = np.tile(applied, (len(inside), 1))
+        control = np.tile(control_of, (len(inside), 1))
         path = rollout(system, origin, control[:, None, :], dt, substeps)
-        reached, crossed = _follow(grid, regions, path)
+        end, crossed = _follow(grid, regions, path)
         crosses.append(crossed)
-        successor[block] = reached.reshape(-1, shape[1])
+        successor[block] = end.reshape(-1, shape[1])
         rewards = system.running_reward(origin, control) * (dt / temperature)
         reward[block] = rewards.reshape(-1, shape[1])
         if progress is not None:
             progress(block.stop, grid.size)
-    return TabularMDP(
+    return TabularModel(
+        system=system,
+        grid=grid,
+        actions=actions,
+        dt=dt,
+        regions=regions,
         successor=successor,
         reward=reward,
         allowed=successor >= 0,
         crosses=sparse.vstack(crosses, format="csr"),
-        action=np.repeat(np.arange(len(actions)), points),
     )
-
-
-def forbid(mdp: TabularMDP, regions: ArrayLike) -> TabularMDP:
-    """The MDP under constraints, equation (3): moves that cross any of `regions` are not allowed.
-
-    Args:
-        mdp: the MDP.
-        regions: indices of columns of `mdp.crosses`.
-    """
-    columns = np.atleast_1d(np.asarray(regions, dtype=np.int64))
-    crossed = np.asarray(mdp.crosses[:, columns].sum(axis=1)).reshape(mdp.successor.shape) > 0
-    forbidden = replace(mdp, allowed=mdp.allowed & ~crossed)
-    if "ways" in vars(mdp):  # what takes the time has been done
-        vars(forbidden)["ways"] = mdp.ways.without(crossed)
-    return forbidden
 
 
 def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int:
@@ -214,7 +239,7 @@ def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int
     return int(np.ceil(dt / shortest - 1e-9))
 
 
-def _follow(grid: Grid, regions: ConstraintSet, path: Floats) -> tuple[Ints, sparse.csr_matrix]:
+def _follow(grid: Grid, regions: Regions, path: Floats) -> tuple[Ints, sparse.csr_matrix]:
     """Successor (-1 where the path leaves the space) and crossings of paths (Q, K+1, n)."""
     stays = np.all(grid.space.contains(path), axis=-1)
     successor = np.full(len(path), -1, dtype=np.int64)

@@ -16,9 +16,10 @@ import numpy as np
 import pandas as pd
 
 from experiments.collate.settings_of import settings_of
-from experiments.point.tables import FIRST, box_table
+from experiments.point.tables import FIRST
+from experiments.point.truth_tables import box_table
 from mlci.grids import Grid
-from mlci.regions import ConstraintSet
+from mlci.regions import Regions
 from mlci.spaces import Ints
 
 if TYPE_CHECKING:
@@ -216,7 +217,7 @@ def _hypothesis_boxes(point: Point) -> pd.DataFrame:
 
 def _grid_boxes(grid: Grid) -> pd.DataFrame:
     """The corners of every cell of a grid."""
-    return box_table("cell", ConstraintSet(grid.space, *grid.corners)).drop(columns="cell")
+    return box_table("cell", Regions(grid.space, *grid.corners)).drop(columns="cell")
 
 
 def _with_boxes(rows: pd.DataFrame, key: str, boxes: pd.DataFrame) -> pd.DataFrame:

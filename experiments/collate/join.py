@@ -22,7 +22,8 @@ from experiments.collate.examples import example_tables
 from experiments.collate.intervals import study_tables
 from experiments.collate.reliability import reliability
 from experiments.collate.settings_of import settings_of
-from experiments.point.tables import TRUTH_TABLES, opening_columns
+from experiments.point.tables import opening_columns
+from experiments.point.truth_tables import TRUTH_TABLES
 from experiments.tracking.files import csv_bytes, digest, replacing
 from experiments.tracking.study import collated, whole_study, write_collated
 from experiments.tracking.trees import flatten

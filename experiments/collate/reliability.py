@@ -7,7 +7,7 @@ import pandas as pd
 
 from experiments.collate.intervals import TAILS, resamples
 from experiments.config.settings import NO_TRUTH
-from experiments.point.beliefs import EDGES
+from experiments.point.belief_counts import EDGES
 from mlci.spaces import Floats, Ints
 
 _OF_ROWS = ("source", "demonstrations", "belief")

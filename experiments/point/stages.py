@@ -23,17 +23,18 @@ import mlci.safety_filter
 import mlci.tabular
 from experiments.config.settings import Settings
 from experiments.tracking.store import Store, Stored
-from mlci.constant_controls import solve_escapes
+from mlci.constant_controls import tabulate_escapes
+from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import Outcome, Trial, crossing, demonstrate, sample_trials
 from mlci.grids import Grid
-from mlci.reachability import SafeSet, solve
-from mlci.regions import ConstraintSet
+from mlci.reachability import SafeSet, solve_safe_set
+from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.spaces import Box, Floats, Ints
-from mlci.tabular import TabularMDP, action_grid, discretize
+from mlci.tabular import TabularModel, action_grid, discretize
 
-# What is stored of a tabular MDP: its own arrays, and those of the sparse matrix of crossings.
-_MOVES = ("successor", "reward", "allowed", "action")
+# What is stored of a tabular model: its own arrays, and those of the sparse matrix of crossings.
+_MOVES = ("successor", "reward", "allowed")
 _CROSSINGS = ("indices", "indptr")
 
 _MOST_BATCHES = 20  # of tasks, among which enough must cross the truth where only those count
@@ -67,9 +68,19 @@ class TrialSet:
         """Indices of the first `most` trials that were kept."""
         return np.flatnonzero(self.outcome == Outcome.KEPT.value)[:most]
 
-    def goal(self, trial: int) -> Box:
-        """The goal of a trial."""
-        return Box(self.goal_lower[trial], self.goal_upper[trial])
+    def demonstration(self, trial: int, horizon: float, dt: float) -> Demonstration:
+        """The path of a trial, with its task.
+
+        Args:
+            trial: its number.
+            horizon: duration of a task [s].
+            dt: time between samples [s].
+        """
+        goal = Box(self.goal_lower[trial], self.goal_upper[trial])
+        task = Task(self.starts[trial], goal, horizon)
+        return Demonstration(
+            task, self.states[trial], self.controls[trial], dt, f"trial_{trial:03d}"
+        )
 
     def counts(self) -> dict[str, int]:
         """How many trials had each outcome."""
@@ -85,10 +96,10 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
     def compute() -> dict[str, np.ndarray]:
         system, truth = settings.model, settings.constraint
         if escapes:
-            found = solve_escapes(system, grid, truth, horizon=settings.horizon)
+            safe = tabulate_escapes(system, grid, truth, horizon=settings.horizon)
         else:
-            found = solve(system, grid, truth)
-        return {"values": found.values, "gradients": found.gradients}
+            safe = solve_safe_set(system, grid, truth)
+        return {"values": safe.values, "gradients": safe.gradients}
 
     depends: tuple[Any, ...] = (
         settings.system,
@@ -192,8 +203,8 @@ def _skill(settings: Settings) -> dict[str, Any]:
     }
 
 
-def tabular_model(settings: Settings, store: Store) -> TabularMDP:
-    """The tabular MDP (1), whose moves know the hypotheses that they cross, and then the truth."""
+def tabular_model(settings: Settings, store: Store) -> TabularModel:
+    """The tabular model (1); its regions are the hypotheses and then the truth's boxes."""
     hypotheses, truth = settings.candidates, settings.constraint
     stored = _discretized(settings, store, "mdp", hypotheses, (*_MOVES, *_CROSSINGS))
     # Apart, so that points which differ in the truth share what takes the time.
@@ -205,12 +216,19 @@ def tabular_model(settings: Settings, store: Store) -> TabularMDP:
         )
         for each, regions in ((stored, hypotheses), (apart, truth))
     ]
-    moves = {name: stored[name] for name in _MOVES}
-    return TabularMDP(**moves, crosses=sparse.hstack(crosses, format="csr"))
+    return TabularModel(
+        system=settings.model,
+        grid=settings.cells,
+        actions=action_grid(settings.model, settings.action_counts),
+        dt=settings.dt,
+        regions=hypotheses.joined(truth),
+        crosses=sparse.hstack(crosses, format="csr"),
+        **{name: stored[name] for name in _MOVES},
+    )
 
 
 def _discretized(
-    settings: Settings, store: Store, stage: str, regions: ConstraintSet, wanted: Sequence[str]
+    settings: Settings, store: Store, stage: str, regions: Regions, wanted: Sequence[str]
 ) -> Stored:
     """Arrays of the tabular MDP with the crossings of some regions, from the store or computed."""
     counts, samples = settings.action_counts, settings.transition.samples
@@ -218,11 +236,11 @@ def _discretized(
     def compute() -> dict[str, np.ndarray]:
         system = settings.model
         actions = action_grid(system, counts)
-        mdp = discretize(
+        model = discretize(
             system, settings.cells, actions, settings.dt, regions, samples, settings.temperature
         )
-        arrays = {name: getattr(mdp, name) for name in _MOVES}
-        arrays |= {name: getattr(mdp.crosses, name) for name in _CROSSINGS}
+        arrays = {name: getattr(model, name) for name in _MOVES}
+        arrays |= {name: getattr(model.crosses, name) for name in _CROSSINGS}
         return {name: arrays[name] for name in wanted}
 
     depends = (
@@ -238,7 +256,7 @@ def _discretized(
     return store.get(stage, depends, modules, compute)
 
 
-def _corners(regions: ConstraintSet) -> list[list[str]]:
+def _corners(regions: Regions) -> list[list[str]]:
     """The corners of regions, for a key: infinite sides are no JSON."""
     sides = np.hstack([regions.lower, regions.upper])
     return [[repr(float(side)) for side in box] for box in sides]

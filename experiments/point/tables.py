@@ -1,171 +1,130 @@
-"""Tables of one point: ranks, ranked hypotheses, and what all points of a truth share."""
+"""Third step of a point: its tables, and how they are written."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
-from experiments.point.stages import TrialSet
+from experiments.point.belief_counts import belief_counts
+from experiments.point.inference import PointInference
+from experiments.point.measures import Measures
+from experiments.point.ranking_tables import rank_table, ranking_table
+from experiments.point.streams import Purpose, stream
+from experiments.point.trajectory_tables import (
+    probability_table,
+    trajectory_tables,
+    trial_that_shows_the_constraint,
+)
+from experiments.point.truth_tables import TRUTH_TABLES, truth_tables
 from experiments.tracking.files import csv_bytes
-from mlci.inference import confidence, rank_constraints
-from mlci.metrics import random_subsets, top_chances, truth_ranks
-from mlci.regions import ConstraintSet
-from mlci.spaces import Bools, Floats, Ints, StateSpace
-
-if TYPE_CHECKING:
-    pass
-
-
-# They are the same for all grids, time steps and actions: collate keeps one copy of each, opened
-# by these columns alone.
-TRUTH_TABLES = {
-    "attempts": ("truth", "seed"),
-    "dimensions": ("truth",),
-    "paths": ("truth", "seed"),
-    "regions": ("truth",),
-}
+from mlci.spaces import Floats
 
 PAPER_SIZE = 9  # demonstrations after which the paper looks at the rank
 FIRST = 5  # demonstrations of the paper's Fig. 7
-BEST = (1, 2)  # so many of the best hypotheses are compared with the truth, as in Fig. 7
-
-_PATH_EVERY = 5  # samples of a path between those that its table keeps
 
 
-def rank_table(
-    settings: Settings, phi: Floats, violated: Bools, reachable: Bools, rng: np.random.Generator
-) -> pd.DataFrame:
-    """A row a random subset of the demonstrations: where the truth is in the ranking after them.
+def point_tables(
+    settings: Settings, point: PointInference, measures: Measures
+) -> dict[str, pd.DataFrame]:
+    """The tables of a point, by name.
 
-    Beside the rank of the truth, if there is one, its columns are shares: whether that rank is
-    among the first, and whether the best hypothesis, or both of the best two, overlap the truth
-    or lie inside it.
+    Returns:
+        `trials`, a row a demonstration; `ranks`, a row a subset of demonstrations; `hypotheses`, a
+        row a hypothesis, ranked with all of them, and `first`, with the first FIRST of them;
+        `summary`, one row; `sampled`, `violations`, `moves` and `probabilities`, of single
+        trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
+        `dimensions` of the state, and `regions` of the truth. If asked for, `calibration`.
     """
-    candidates, constraint = settings.candidates, settings.constraint
-    truth = candidates.inside(constraint)
-    good = {"overlap": candidates.overlaps(constraint), "inside": truth}
-    best = [top for top in BEST if top <= len(candidates)] if len(constraint) else []
-    wanted = settings.ranks
-    rows = []
-    for subsets in random_subsets(len(phi), wanted.demonstrations, wanted.subsets, rng):
-        rank = truth_ranks(phi, violated, truth, subsets)
-        in_top = (rank <= wanted.top).astype(int) if truth.any() else np.nan
-        rows.append(
-            pd.DataFrame(
-                {
-                    "demonstrations": subsets.shape[1],
-                    "subset": np.arange(len(subsets)),
-                    "reachable": np.sum(reachable[subsets], axis=1),
-                    "rank": rank,
-                    f"share_top_{wanted.top}": in_top,
-                    **{
-                        f"top_{top}_{name}": top_chances(phi, violated, which, subsets, top)
-                        if top in best
-                        else np.nan
-                        for name, which in good.items()
-                        for top in BEST
-                    },
-                }
-            )
-        )
-    return pd.concat(rows, ignore_index=True)
-
-
-def ranking_table(
-    hypotheses: ConstraintSet, phi: Floats, violated: Bools, prior_none: float
-) -> pd.DataFrame:
-    """A row a hypothesis: its box, gain, rank and probabilities.
-
-    Args:
-        hypotheses: the C hypotheses.
-        phi: (N', C) of the demonstrations that the tabular model can follow.
-        violated: (N, C) of all demonstrations.
-        prior_none: prior probability of no constraint.
-    """
-    ranking = rank_constraints(phi, violated, prior_none)
-    prior = (1 - prior_none) / len(hypotheses)
-    certainty = [
-        confidence(prior, phi[:, i]) if ranking.feasible[i] else 0.0 for i in range(len(hypotheses))
-    ]
-    return pd.DataFrame(
-        {
-            **box_table("hypothesis", hypotheses),
-            "feasible": ranking.feasible,
-            "violating_demonstrations": np.sum(violated, axis=0),
-            "gain": ranking.gain,
-            "rank": ranking.rank,
-            "posterior": ranking.posterior,
-            "confidence_alone": certainty,
-        }
-    )
-
-
-def truth_tables(settings: Settings, trials: TrialSet, kept: Ints) -> dict[str, pd.DataFrame]:
-    """What all points of a truth share: the pairs that were tried, the paths, the state space."""
-    space = settings.model.space
-    sampled = trials.states[kept][:, ::_PATH_EVERY]
-    times = np.arange(sampled.shape[1]) * _PATH_EVERY * settings.demonstrations.dt
-    return {
-        "attempts": pd.DataFrame(
-            {
-                "trial": np.arange(len(trials.outcome)),
-                "outcome": trials.outcome,
-                "cost": trials.cost,
-                "goal_distance": trials.miss,
-                "peak_control": np.max(np.abs(trials.controls), axis=(1, 2)),
-            }
+    inference = point.inference
+    covered = inference.hypotheses.inside(settings.constraint)
+    overlapping = inference.hypotheses.overlaps(settings.constraint)
+    example = trial_that_shows_the_constraint(measures.feasible, inference.phi, covered)
+    example_number = int(point.numbers[example]) if measures.feasible.any() else None
+    violated = dict(zip(point.numbers.tolist(), inference.violated, strict=True))
+    ranks = rank_table(settings, inference, stream(settings.seed, Purpose.SUBSETS, 0))
+    tables = {
+        "trials": _trial_table(point, measures, covered),
+        "ranks": ranks,
+        **{
+            name: ranking_table(part).assign(covered_by_truth=covered, overlaps_truth=overlapping)
+            for name, part in (("hypotheses", inference), ("first", inference.of(slice(FIRST))))
+        },
+        **trajectory_tables(
+            point.model, point.hypotheses, measures.trajectories, violated, example_number
         ),
-        "paths": pd.DataFrame(
-            {
-                "demonstration": np.repeat(kept, len(times)),
-                "time": np.tile(times, len(kept)),
-                **{name: sampled[..., d].ravel() for d, name in enumerate(space.names)},
-            }
+        "probabilities": probability_table(
+            example_number, inference.phi[example], measures.phi[example]
         ),
-        "dimensions": dimension_table(space),
-        "regions": box_table("region", settings.constraint),
+        **truth_tables(settings, point.trials, point.numbers),
+        "summary": _summary_table(settings, point, measures, ranks),
     }
+    if settings.calibration.sets:
+        tables["calibration"] = belief_counts(settings, point)
+    return tables
 
 
-def box_table(what: str, boxes: ConstraintSet) -> pd.DataFrame:
-    """A row a box, numbered in the column `what`: its corners, infinite where it is free."""
-    names = boxes.space.names
-    return pd.DataFrame(
-        {
-            what: np.arange(len(boxes)),
-            **{f"lower_{name}": boxes.lower[:, k] for k, name in enumerate(names)},
-            **{f"upper_{name}": boxes.upper[:, k] for k, name in enumerate(names)},
-        }
-    )
-
-
-def dimension_table(space: StateSpace) -> pd.DataFrame:
-    """A row a dimension of the state: what figures need to know of it."""
-    return pd.DataFrame(
-        {
-            "name": space.names,
-            "unit": space.units,
-            "lower": space.bounds.lower,
-            "upper": space.bounds.upper,
-            "periodic": space.periodic,
-        }
-    )
-
-
-def opening_columns(measure: str, settings: Settings) -> dict[str, str | int | float]:
+def opening_columns(name: str, settings: Settings) -> dict[str, str | int | float]:
     """The values that open every row of a point's table."""
     columns = settings.columns
-    return {name: columns[name] for name in TRUTH_TABLES.get(measure, columns)}
+    return {column: columns[column] for column in TRUTH_TABLES.get(name, columns)}
 
 
-def table_bytes(measure: str, frame: pd.DataFrame, settings: Settings) -> bytes:
+def table_bytes(name: str, frame: pd.DataFrame, settings: Settings) -> bytes:
     """A point's table as CSV, every row opened by the point's own values, floats exact."""
-    columns = opening_columns(measure, settings)
-    kept = [name for name in frame.columns if name not in columns]
-    opened = frame[kept].copy()
-    for place, (name, value) in enumerate(columns.items()):
-        opened.insert(place, name, value)
-    return csv_bytes(opened)
+    opening = opening_columns(name, settings)
+    rows = frame.drop(columns=[column for column in frame.columns if column in opening])
+    for place, (column, value) in enumerate(opening.items()):
+        rows.insert(place, column, value)
+    return csv_bytes(rows)
+
+
+def _trial_table(point: PointInference, measures: Measures, covered: np.ndarray) -> pd.DataFrame:
+    """A row a demonstration: what the tabular agent makes of its task."""
+    phi = point.inference.phi[:, covered]
+    return pd.DataFrame(
+        {
+            "trial": point.numbers,
+            "reachable": point.inference.reachable,
+            "feasible": measures.feasible,
+            "final_state_error": measures.final_state_error,
+            "violation_distance": measures.violation_distance,
+            "violation_floor": measures.violation_floor,
+            "violation_distance_pooled": measures.violation_share,
+            "truth_probability": np.max(phi, axis=1) if covered.any() else np.nan,
+        }
+    )
+
+
+def _summary_table(
+    settings: Settings, point: PointInference, measures: Measures, ranks: pd.DataFrame
+) -> pd.DataFrame:
+    """One row: counts of pairs by outcome, means of the measures, the diagnosis."""
+    feasible, diagnosis, top = measures.feasible, point.diagnosis, settings.ranks.top
+    after = ranks[ranks["demonstrations"] == PAPER_SIZE]
+    row = {
+        "pairs": len(point.trials.outcome),
+        **point.trials.counts(),
+        "demonstrations": len(point.numbers),
+        "reachable": int(np.sum(point.inference.reachable)),
+        "feasible": int(np.sum(feasible)),
+        "final_state_error": _mean(measures.final_state_error[feasible]),
+        "violation_distance": _mean(measures.violation_distance[feasible]),
+        "violation_floor": _mean(measures.violation_floor[feasible]),
+        "violation_distance_pooled": _mean(measures.violation_share[feasible]),
+        f"rank_after_{PAPER_SIZE}": after["rank"].median(),
+        f"share_top_{top}_after_{PAPER_SIZE}": after[f"share_top_{top}"].mean(),
+        "stay": diagnosis.stay,
+        "leave": diagnosis.leave,
+        "cells_crossed": diagnosis.cells_crossed,
+        **{
+            f"frozen_{name}": share
+            for name, share in zip(settings.model.space.names, diagnosis.frozen, strict=True)
+        },
+    }
+    return pd.DataFrame([row])
+
+
+def _mean(values: Floats) -> float:
+    """The mean, NaN of nothing."""
+    return float(np.mean(values)) if len(values) else np.nan

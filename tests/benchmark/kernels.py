@@ -6,30 +6,30 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from mlci.online import prepare
 
 from experiments.config.settings import Settings
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.inference import rank_constraints
 from mlci.maxent import expected_violations, log_partition, violation_probabilities
-from mlci.online import prepare
-from mlci.reachability import solve
-from mlci.regions import ConstraintSet
+from mlci.reachability import solve_safe_set
+from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import rk4_step, step_count
 from mlci.spaces import Box, Floats, Ints
 from mlci.systems import Pendulum, System
-from mlci.tabular import TabularMDP, action_grid, discretize, substep_count
+from mlci.tabular import TabularModel, action_grid, discretize, substep_count
 from tests.benchmark.timing import Row, copy_rate, median_seconds
 
 _BLOCK = 1 << 14  # moves, whose states stay in the cache
 
 SYSTEM = Pendulum()
-HYPOTHESES = ConstraintSet.from_grid(SYSTEM.space, (10, 10))
-TRUTH = ConstraintSet(SYSTEM.space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])  # type: ignore[arg-type]
+HYPOTHESES = Regions.from_grid(SYSTEM.space, (10, 10))
+TRUTH = Regions(SYSTEM.space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])  # type: ignore[arg-type]
 
 
-def phi_floor(mdp: TabularMDP, log_z: Floats) -> float:
+def phi_floor(mdp: TabularModel, log_z: Floats) -> float:
     """Seconds to read the row of Phi of each successor and to write each cell's, once a step."""
     traffic = 0
     ways = mdp.ways
@@ -42,13 +42,13 @@ def phi_floor(mdp: TabularMDP, log_z: Floats) -> float:
     return traffic * mdp.crosses.shape[1] * 8 / copy_rate(1 << 19)
 
 
-def exp_floor(mdp: TabularMDP, log_z: Floats) -> float:
+def exp_floor(mdp: TabularModel, log_z: Floats) -> float:
     """Seconds to take the exponential of each way of each cell that carries probability."""
     entries = int(np.sum((log_z > -np.inf) @ np.diff(mdp.ways.begins)))
     return median_seconds(lambda: np.exp(np.full(entries, -1.0)))
 
 
-def step_floor(system: System, grid: Grid, actions: Floats, dt: float, mdp: TabularMDP) -> float:
+def step_floor(system: System, grid: Grid, actions: Floats, dt: float, mdp: TabularModel) -> float:
     """Seconds of the Runge-Kutta steps of all moves, from the rate of a block of them."""
     cells = max(1, min(grid.size, _BLOCK // mdp.moves))
     points = np.repeat(grid.centers[:cells], mdp.moves, axis=0)
@@ -182,7 +182,7 @@ def telescope_tasks(settings: Settings) -> tuple[list[Floats], list[int], Sequen
 def demonstrator_rows() -> list[Row]:
     """Safe set, and 100 tasks x 3 restarts of iLQR with the filter."""
     grid = Grid(SYSTEM.space, (201, 201))
-    omega = solve(SYSTEM, grid, TRUTH)
+    omega = solve_safe_set(SYSTEM, grid, TRUTH)
     margin = border_margin(SYSTEM, omega, 0.01)
     box = Box(np.array([0.0, -2.0]), np.array([2 * np.pi, 2.0]))
     trials = sample_trials(
@@ -194,7 +194,7 @@ def demonstrator_rows() -> list[Row]:
     return [
         Row(
             "safe_set_201x201",
-            median_seconds(lambda: solve(SYSTEM, grid, TRUTH), 3),
+            median_seconds(lambda: solve_safe_set(SYSTEM, grid, TRUTH), 3),
             float("nan"),
             3,
             "safe set of the pendulum, 201 x 201, to convergence",

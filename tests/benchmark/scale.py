@@ -22,7 +22,7 @@ from experiments.tracking.environment import peak_memory
 from mlci.grids import Grid
 from mlci.inference import rank_constraints
 from mlci.maxent import log_partition, violation_probabilities
-from mlci.regions import ConstraintSet
+from mlci.regions import Regions
 from mlci.simulate import step_count
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import System
@@ -75,7 +75,7 @@ def measure(name: str, shape: tuple[int, ...]) -> dict[str, object]:
         goal = Box(middle + offsets.lower, middle + offsets.upper)
     else:
         system = Torus()
-        hypotheses = ConstraintSet.from_grid(system.space, (10, None, 10, None))
+        hypotheses = Regions.from_grid(system.space, (10, None, 10, None))
         start, free = np.array([5.4, 0.0, 0.7, 0.0]), np.array([0.0, np.inf, 0.0, np.inf])
         goal = Box(np.array([0.5, 0.0, 1.1, 0.0]) - free, np.array([0.8, 0.0, 1.3, 0.0]) + free)
     grid, actions = Grid(system.space, shape), action_grid(system, [5, 3])

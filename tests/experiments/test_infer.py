@@ -19,13 +19,13 @@ from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.reachability import solve
 from mlci.recordings.read import write_demonstration
-from mlci.regions import ConstraintSet
+from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.spaces import Box
 from mlci.systems import Pendulum
 
 SCRIPT = CHECKOUT / "experiments" / "infer.py"
-TRUTH = ConstraintSet(Pendulum().space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])
+TRUTH = Regions(Pendulum().space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])
 
 
 def infer(folder: Path, *overrides: str) -> subprocess.CompletedProcess[str]:
@@ -85,7 +85,7 @@ def test_recorded_demonstrations_are_ranked_and_saved(
     ].iloc[0]
     assert truth["feasible"]
     assert truth["rank"] <= 5
-    candidates = ConstraintSet.from_grid(Pendulum().space, (10, 10))
+    candidates = Regions.from_grid(Pendulum().space, (10, 10))
     violations = pd.read_csv(folder / "violations.csv").pivot(
         index="demonstration", columns="hypothesis", values="violated"
     )

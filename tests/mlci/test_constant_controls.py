@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from mlci.constant_controls import escape_value, solve_escapes
+from mlci.constant_controls import escape_value, tabulate_escapes
 from mlci.grids import Grid
-from mlci.reachability import solve
-from mlci.regions import ConstraintSet
+from mlci.reachability import solve_safe_set
+from mlci.regions import Regions
 from mlci.simulate import rk4_step
 from mlci.spaces import Box, StateSpace
 from mlci.systems import Pendulum, System, TelescopingPendulum
 
 FREE = np.inf
 TELESCOPE = TelescopingPendulum()
-PAIN = ConstraintSet(TELESCOPE.space, [[-0.3, -FREE, 7.2, -FREE]], [[0.3, FREE, 8.2, FREE]])
+PAIN = Regions(TELESCOPE.space, [[-0.3, -FREE, 7.2, -FREE]], [[0.3, FREE, 8.2, FREE]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ MASSES = TwoMasses()
 def wall(d):
     """Positions from -0.5 to 0.5 of one of the masses, whatever the other does."""
     side = np.where(np.arange(4) == 2 * d, 0.5, FREE)
-    return ConstraintSet(MASSES.space, [-side], [side])
+    return Regions(MASSES.space, [-side], [side])
 
 
 def braking_value(position, speed, limit):
@@ -77,8 +77,8 @@ def test_on_a_grid_the_equation_has_the_same_parabola():
         grid = Grid(MASSES.space, (count, count, 2, 2))
         exact = braking_value(*grid.centers[:, :2].T, 1.0)
         near = np.abs(exact) < 0.3
-        escapes = solve_escapes(MASSES, grid, wall(0), horizon=5.0, step=0.025)
-        equation = solve(MASSES, grid, wall(0))
+        escapes = tabulate_escapes(MASSES, grid, wall(0), horizon=5.0, step=0.025)
+        equation = solve_safe_set(MASSES, grid, wall(0))
         exact_error.append(np.abs(escapes.values - exact)[near].max())
         equation_error.append(np.abs(equation.values - exact)[near].mean())
     assert max(exact_error) < 1e-3
@@ -87,7 +87,7 @@ def test_on_a_grid_the_equation_has_the_same_parabola():
 
 
 def test_a_mass_may_pass_beside_a_box():
-    box = ConstraintSet(MASSES.space, [[-0.5, -FREE, -0.6, -FREE]], [[0.5, FREE, 0.6, FREE]])
+    box = Regions(MASSES.space, [[-0.5, -FREE, -0.6, -FREE]], [[0.5, FREE, 0.6, FREE]])
     start = np.array([[-2.5, 2.2, 0.4, 0.0], [-2.5, 2.2, 0.0, 0.0]])
     # The first brakes too late for x, but y is beside the box by then; the second has no time.
     time = np.linspace(0, 2, 2001)
@@ -104,8 +104,8 @@ def test_a_mass_may_pass_beside_a_box():
 @pytest.mark.parametrize("corners", [((np.pi, 0.0), (1.2 * np.pi, 1.2))])
 def test_the_equation_on_a_fine_grid_agrees_on_the_pendulum(corners):
     pendulum = Pendulum()
-    keep_out = ConstraintSet(pendulum.space, [corners[0]], [corners[1]])
-    fine = solve(pendulum, Grid(pendulum.space, (161, 161)), keep_out)
+    keep_out = Regions(pendulum.space, [corners[0]], [corners[1]])
+    fine = solve_safe_set(pendulum, Grid(pendulum.space, (161, 161)), keep_out)
     states = np.random.default_rng(0).uniform([2.0, -2.0], [5.0, 2.0], (2000, 2))
     value = escape_value(pendulum, keep_out, states, 6.0, 0.02)
     near = np.abs(value) < 0.1
@@ -163,7 +163,7 @@ def test_a_table_of_values_comes_closer_with_its_cells():
     near = np.abs(exact) < 0.1
     errors = []
     for shape in ((9, 7, 9, 7), (17, 13, 17, 13)):
-        table = solve_escapes(TELESCOPE, Grid(TELESCOPE.space, shape), PAIN, horizon=5.0)
+        table = tabulate_escapes(TELESCOPE, Grid(TELESCOPE.space, shape), PAIN, horizon=5.0)
         errors.append(np.abs(table.value(states) - exact)[near].mean())
     assert errors[1] < 0.6 * errors[0] < 0.06
 

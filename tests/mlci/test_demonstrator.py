@@ -7,8 +7,8 @@ from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import Outcome, Trial, crossing, demonstrate, enters, sample_trials
 from mlci.grids import Grid
 from mlci.ilqr import optimize
-from mlci.reachability import solve
-from mlci.regions import ConstraintSet
+from mlci.reachability import solve_safe_set
+from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import euler_step, rollout
 from mlci.spaces import Box
@@ -18,12 +18,12 @@ PENDULUM = Pendulum()
 DT = 0.01
 START_BOX = Box(np.array([0.0, -2.0]), np.array([2 * np.pi, 2.0]))
 TRUTH = Box(np.array([np.pi, 0.0]), np.array([1.2 * np.pi, 1.2]))
-TRUTHS = ConstraintSet.from_boxes(PENDULUM.space, [TRUTH])
+TRUTHS = Regions.from_boxes(PENDULUM.space, [TRUTH])
 
 
 @pytest.fixture(scope="module")
 def safe_set():
-    return solve(PENDULUM, Grid(PENDULUM.space, (81, 81)), TRUTHS)
+    return solve_safe_set(PENDULUM, Grid(PENDULUM.space, (81, 81)), TRUTHS)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def trial(start, goal, *levels, system=PENDULUM, horizon=5.0):
 
 def around(state, size=0.05):
     """A truth: a small box around a state of the pendulum."""
-    return ConstraintSet.from_boxes(PENDULUM.space, [Box(state - size, state + size)])
+    return Regions.from_boxes(PENDULUM.space, [Box(state - size, state + size)])
 
 
 def test_a_trial_does_not_depend_on_how_many_there_are():
@@ -218,7 +218,7 @@ def test_motion_between_samples_counts():
     states, controls = np.array([[[0.0, 0.0], [0.5, 1.0]]]), np.ones((1, 1, 1))
 
     def entered(lower, upper):
-        truth = ConstraintSet.from_boxes(mass.space, [Box(np.array(lower), np.array(upper))])
+        truth = Regions.from_boxes(mass.space, [Box(np.array(lower), np.array(upper))])
         return enters(mass, truth, states, controls, 1.0).tolist()
 
     assert entered([0.10, 0.4], [0.15, 0.6]) == [True]  # the motion passes, the chord does not

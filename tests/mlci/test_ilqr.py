@@ -7,8 +7,8 @@ from scipy.optimize import brentq, lsq_linear
 
 from mlci.grids import Grid
 from mlci.ilqr import optimize
-from mlci.reachability import solve
-from mlci.regions import ConstraintSet
+from mlci.reachability import solve_safe_set
+from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import euler_step, rollout
 from mlci.spaces import Box, StateSpace
@@ -204,7 +204,7 @@ def test_cost_is_effort_plus_the_goals_price():
 def safety_filter():
     truth = Box(np.array([np.pi, 0.0]), np.array([1.2 * np.pi, 1.2]))
     grid = Grid(PENDULUM.space, (61, 61))
-    safe_set = solve(PENDULUM, grid, ConstraintSet.from_boxes(PENDULUM.space, [truth]))
+    safe_set = solve_safe_set(PENDULUM, grid, Regions.from_boxes(PENDULUM.space, [truth]))
     return SafetyFilter(PENDULUM, safe_set, DT, border_margin(PENDULUM, safe_set, DT), 0.2)
 
 

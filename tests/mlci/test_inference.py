@@ -1,125 +1,192 @@
-"""Ranking and posteriors against Bayes' rule written out, and against simulated truths."""
+"""`infer`, at once or with tasks that were prepared, against (4)-(6) put together by hand."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from mlci.inference import (
-    confidence,
-    log_likelihood_gain,
-    posterior,
-    printed_confidence,
-    rank_constraints,
-    rank_scores,
-)
+from mlci.demonstrations import Demonstration, Task
+from mlci.evidence import Ranking, rank_constraints
+from mlci.grids import Grid
+from mlci.inference import Inference, PreparedInference, infer, prepare
+from mlci.maxent import TrajectoryDistribution
+from mlci.regions import Regions
+from mlci.simulate import rollout
+from mlci.spaces import Box
+from mlci.systems import DoubleIntegrator
+from mlci.tabular import TabularModel, action_grid, discretize
 
-
-def test_gain_is_one_factor_a_demonstration() -> None:
-    """Two demonstrations with their own Phi: the most likely one is not where Z_C is smallest."""
-    phi = np.array([[0.9, 0.6, 0.0], [0.0, 0.8, 0.0]])
-    ranking = rank_constraints(phi, np.zeros((2, 3), dtype=bool))
-    np.testing.assert_allclose(
-        ranking.gain, [np.log(10), np.log(1 / 0.4) + np.log(1 / 0.2), 0.0], rtol=1e-12
+SYSTEM = DoubleIntegrator()
+GRID = Grid(SYSTEM.space, (12, 10))
+HYPOTHESES = Regions.from_grid(SYSTEM.space, (10, 10))
+# The last goal is further than the bounds allow to go in the time.
+TASKS = [
+    Task(np.array(start), Box.point(end), horizon)
+    for start, end, horizon in (
+        ([-1.0, 0.0], [1.0, 0.0], 5.0),
+        ([2.0, 0.5], [-1.0, 0.0], 5.0),
+        ([0.0, -1.0], [1.5, 0.5], 4.0),
+        ([-2.9, 0.0], [2.9, 0.0], 1.0),
     )
-    assert ranking.order.tolist() == [1, 0, 2]
+]
 
 
-def test_a_violated_hypothesis_is_infeasible_and_last() -> None:
-    phi = np.array([[0.9, 0.5, 0.1, 0.2]])
-    violated = np.array([[True, False, False, False], [False, False, False, True]])
-    ranking = rank_constraints(phi, violated)
-    assert ranking.feasible.tolist() == [False, True, True, False]
-    assert ranking.rank.tolist() == [3.5, 1.0, 2.0, 3.5]
-    assert ranking.order.tolist() == [1, 2, 0, 3]
-    assert ranking.posterior[0] == ranking.posterior[3] == 0
-    assert ranking.gain[0] == -np.inf
+@pytest.fixture(scope="module")
+def model() -> TabularModel:
+    return discretize(SYSTEM, GRID, action_grid(SYSTEM, 5), 0.5, HYPOTHESES)
 
 
-def test_ties_share_their_mean_rank() -> None:
-    assert rank_scores([0.0, 2.0, 0.0, 0.0], np.ones(4, dtype=bool)).tolist() == [3, 1, 3, 3]
+@pytest.fixture(scope="module")
+def prepared(model: TabularModel) -> PreparedInference:
+    return prepare(model, TASKS)
 
 
-def test_posterior_is_the_prior_without_demonstrations() -> None:
-    chance, none = posterior(np.zeros(4), prior_none=0.3, prior=[1, 2, 3, 4])
-    np.testing.assert_allclose(chance, 0.7 * np.array([0.1, 0.2, 0.3, 0.4]))
-    assert none == pytest.approx(0.3)
+def demonstration(task: int, seed: int) -> Demonstration:
+    """A path that begins where a task does, with random controls."""
+    rng = np.random.default_rng([task, seed])
+    count = round(TASKS[task].horizon / 0.01)
+    path = rollout(SYSTEM, TASKS[task].start, rng.uniform(-0.6, 0.6, (count, 1)), 0.01)
+    return Demonstration(TASKS[task], path, None, 0.01, f"path {task}.{seed}")
 
 
-def test_posterior_is_bayes_rule() -> None:
-    phi = np.array([[0.2, 0.7, 0.4], [0.5, 0.1, 0.3]])
-    violated = np.array([[False, False, True], [False, False, False]])
-    likelihood = np.append(np.prod(1 / (1 - phi), axis=0) * ~violated.any(axis=0), 1.0)
-    weight = np.append([0.2] * 3, 0.4) * likelihood
-    ranking = rank_constraints(phi, violated, prior_none=0.4)
-    np.testing.assert_allclose(ranking.posterior, (weight / weight.sum())[:3])
-    assert ranking.posterior_none == pytest.approx(weight[3] / weight.sum())
+def assert_same(one: Ranking, other: Ranking) -> None:
+    for name in ("gain", "feasible", "rank", "order", "posterior", "posterior_none"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
-def test_posterior_is_calibrated_over_simulated_truths() -> None:
-    """Draw a truth from the prior, demonstrations from the truth; compare belief and frequency.
-
-    Trajectories are rows of a 0/1 table with known probabilities, so that Phi is exact. Over
-    4000 rounds each bin of 100 or more must agree to four standard errors.
-    """
-    rng = np.random.default_rng(0)
-    trajectories = rng.random((12, 3)) < 0.3  # which of three regions each of 12 paths crosses
-    chance = rng.dirichlet(np.ones(12))
-    phi = chance @ trajectories
-    beliefs, outcomes = [], []
-    for _ in range(4000):
-        truth = int(rng.choice(4, p=[0.15, 0.15, 0.2, 0.5]))
-        allowed = np.ones(12, dtype=bool) if truth == 3 else ~trajectories[:, truth]
-        count = int(rng.integers(0, 6))
-        drawn = rng.choice(12, size=count, p=chance * allowed / np.sum(chance * allowed))
-        ranking = rank_constraints(
-            np.tile(phi, (count, 1)), trajectories[drawn], 0.5, prior=[0.15, 0.15, 0.2]
-        )
-        beliefs.extend([*ranking.posterior, ranking.posterior_none])
-        outcomes.extend(np.arange(4) == truth)
-    bins = np.minimum((np.array(beliefs) * 10).astype(int), 9)
-    for b in range(10):
-        here = bins == b
-        if np.sum(here) >= 100:
-            p = np.mean(np.array(beliefs)[here])
-            error = np.sqrt(max(p * (1 - p), 1e-4) / np.sum(here))
-            assert abs(np.mean(np.array(outcomes)[here]) - p) < 4 * error
+def by_hand(model: TabularModel, demonstrations: list[Demonstration], prior_none: float) -> Ranking:
+    phi = []
+    for each in demonstrations:
+        distribution = TrajectoryDistribution.of_task(model, each.task)
+        if distribution.is_possible:
+            phi.append(distribution.violation_probabilities())
+    violated = [HYPOTHESES.violated_by(each.states) for each in demonstrations]
+    return rank_constraints(phi, violated, prior_none)
 
 
-def test_an_infinite_gain_takes_all_probability() -> None:
-    chance, none = posterior(np.array([np.inf, 3.0, np.inf, -np.inf]), prior=[1, 1, 3, 1])
-    assert chance.tolist() == [0.25, 0.0, 0.75, 0.0]
-    assert none == 0.0
-    assert log_likelihood_gain([1.0]).tolist() == [np.inf]
+def test_infer_is_the_ranking_of_each_task_alone(model: TabularModel) -> None:
+    """A task done twice, one never, one whose goal cannot be reached; paths of several lengths."""
+    demonstrations = [demonstration(task, seed) for seed, task in enumerate([2, 0, 2, 3])]
+    inference = infer(model, demonstrations, prior_none=0.3)
+    assert inference.reachable.tolist() == [True, True, True, False]
+    assert not inference.phi[3].any()
+    assert inference.names == ("path 2.0", "path 0.1", "path 2.2", "path 3.3")
+    expected = by_hand(model, demonstrations, 0.3)
+    assert 10 < np.sum(expected.feasible) < 100
+    assert np.ptp(expected.gain[expected.feasible]) > 0.1
+    assert_same(inference.ranking, expected)
 
 
-def test_confidence_of_a_hypothesis_fixed_in_advance() -> None:
-    assert confidence(0.5, np.full(9, 0.2)) == pytest.approx(1 / (1 + 0.8**9))
-    assert confidence(0.5, np.full(9, 0.2)) == pytest.approx(0.8817, abs=5e-5)
-    assert confidence(0.3, []) == pytest.approx(0.3)
-    assert confidence(0.0, [1.0]) == 0.0
-    chance, _ = posterior(np.array([9 * np.log(1 / 0.8)]), prior_none=0.5)
-    assert chance[0] == pytest.approx(confidence(0.5, np.full(9, 0.2)))
+def test_prepared_tasks_give_the_same(model: TabularModel, prepared: PreparedInference) -> None:
+    demonstrations = [demonstration(task, seed) for seed, task in enumerate([2, 0, 2, 3])]
+    paths = [each.states for each in demonstrations]
+    ready = prepared.infer(paths, [2, 0, 2, 3], prior_none=0.3)
+    assert_same(ready.ranking, infer(model, demonstrations, prior_none=0.3).ranking)
+    assert ready.names == ("0", "1", "2", "3")
+    once = [demonstration(task, 0).states for task in range(4)]
+    assert_same(prepared.infer(once).ranking, prepared.infer(once, [0, 1, 2, 3]).ranking)
 
 
-def test_errors_name_the_fault() -> None:
-    with pytest.raises(ValueError, match=r"\(N, C\) each"):
-        rank_constraints(np.zeros((2, 3)), np.zeros((2, 4), dtype=bool))
-    with pytest.raises(ValueError, match=r"must lie in \[0, 1\]"):
-        rank_constraints(np.full((1, 2), 1.1), np.zeros((1, 2), dtype=bool))
-    with pytest.raises(ValueError, match="prior of no constraint"):
-        posterior(np.zeros(2), prior_none=0.0)
-    with pytest.raises(ValueError, match="weights >= 0"):
-        posterior(np.zeros(2), prior=[1.0, -1.0])
-    with pytest.raises(ValueError, match=r"lies in \[0, 1\]"):
-        confidence(1.5, [])
+def test_any_number_of_jobs_gives_the_same_bits(model: TabularModel) -> None:
+    fresh, calls = replace(model), []
+    in_parallel = prepare(fresh, TASKS, n_jobs=2, progress=lambda *count: calls.append(count))
+    alone = prepare(model, TASKS)
+    np.testing.assert_array_equal(in_parallel.phi, alone.phi)
+    np.testing.assert_array_equal(in_parallel.reachable, alone.reachable)
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
-def test_printed_confidence_is_what_the_paper_prints() -> None:
-    assert printed_confidence(0.5, [0.2] * 9) == pytest.approx(1.155, abs=5e-4)
-    assert printed_confidence(0.9, [0.5]) == pytest.approx(0.9 / (0.9 - 0.1 * 0.5))
-    assert printed_confidence(0.5, []) == np.inf
-    assert printed_confidence(0.2, [0.1]) == pytest.approx(0.2 / (0.2 - 0.8 * 0.9))
-    assert printed_confidence(0.2, [0.1]) < 0
-    with pytest.raises(ValueError, match=r"\[0, 1\], not 1.5"):
-        printed_confidence(1.5, [0.1])
+def test_only_the_hypotheses_of_a_mask_are_ranked() -> None:
+    """A truth among the model's regions is no hypothesis, wherever it stands."""
+    truth = Regions.from_boxes(SYSTEM.space, [Box([0.0, 0.0], [0.5, 0.5])], ["truth"])
+    regions = truth.joined(HYPOTHESES)
+    model = discretize(SYSTEM, GRID, action_grid(SYSTEM, 5), 0.5, regions)
+    demonstrations = [demonstration(task, 0) for task in (0, 2)]
+    inference = infer(model, demonstrations, hypotheses=regions.mask(HYPOTHESES.names))
+    assert inference.hypotheses.names == HYPOTHESES.names
+    plain = discretize(SYSTEM, GRID, action_grid(SYSTEM, 5), 0.5, HYPOTHESES)
+    np.testing.assert_allclose(inference.phi, infer(plain, demonstrations).phi, atol=1e-14)
+
+
+def test_some_of_the_demonstrations(model: TabularModel) -> None:
+    demonstrations = [demonstration(task, seed) for seed, task in enumerate([2, 0, 3, 2])]
+    inference = infer(model, demonstrations, prior_none=0.2)
+    for part, numbers in ((slice(2), [0, 1]), ([3, 1], [3, 1])):
+        chosen = [demonstrations[number] for number in numbers]
+        assert_same(inference.of(part).ranking, by_hand(model, chosen, 0.2))
+        assert inference.of(part).names == tuple(each.name for each in chosen)
+
+
+def hand_made() -> Inference:
+    """Three hypotheses, one of them refuted, one that an agent cannot avoid in a task."""
+    boxes = [Box([-1.0, -np.inf], [0.0, np.inf]), Box([0.0, -np.inf], [1.0, np.inf])]
+    boxes.append(Box([1.0, -np.inf], [2.0, np.inf]))
+    return Inference(
+        Regions.from_boxes(SYSTEM.space, boxes, ["left", "middle", "right"]),
+        ("first", "second"),
+        np.array([[0.5, 0.75, 1.0], [0.0, 0.0, 0.0]]),
+        np.array([[True, False, False], [False, False, False]]),
+        np.array([True, False]),
+    )
+
+
+def test_the_frame_has_a_row_a_hypothesis_with_names_and_units() -> None:
+    frame = hand_made().to_frame()
+    assert list(frame) == [
+        "hypothesis", "position from [m]", "position to [m]", "rank", "gain", "posterior",
+        "violated_by",
+    ]  # fmt: skip
+    assert frame["hypothesis"].tolist() == ["right", "middle", "left"]
+    assert frame["position from [m]"].tolist() == [1.0, 0.0, -1.0]
+    assert frame["position to [m]"].tolist() == [2.0, 1.0, 0.0]
+    assert frame["gain"].tolist() == [np.inf, -np.log(0.25), -np.inf]
+    assert frame["violated_by"].tolist() == [0, 0, 1]
+    assert frame["rank"].tolist() == [1, 2, 3]
+
+
+def test_repr_and_summary_say_what_was_inferred_and_what_is_doubtful() -> None:
+    text = repr(hand_made())
+    assert text.startswith("2 demonstrations, 3 hypotheses; probability of no constraint 0\n")
+    assert "cannot reach the goal of second" in text
+    assert "cannot avoid right: their gain is infinite" in text
+    many = Inference(
+        HYPOTHESES, ("a",), np.zeros((1, 100)), np.zeros((1, 100), bool), np.ones(1, bool)
+    )
+    assert many.warnings == []
+    assert [len(words.splitlines()) for words in (repr(many), many.summary())] == [7, 12]
+
+
+def test_wrong_input_is_refused(model: TabularModel, prepared: PreparedInference) -> None:
+    path = demonstration(0, 0).states
+    with pytest.raises(ValueError, match=r"2 paths need as many tasks and names, not \[1\]"):
+        prepared.infer([path, path], [1])
+    with pytest.raises(ValueError, match=r"1 paths need as many tasks .* not \[0, 1, 2, 3\]"):
+        prepared.infer([path])
+    with pytest.raises(ValueError, match=r"1 paths need .* and \['a', 'b'\]"):
+        prepared.infer([path], [0], names=["a", "b"])
+    for wrong in (4, -1):
+        with pytest.raises(ValueError, match=rf"numbered 0 to 3, not \[{wrong}\]"):
+            prepared.infer([path], [wrong])
+    fewer = Regions.from_grid(SYSTEM.space, (5, 5))
+    with pytest.raises(ValueError, match=r"phi \(4, 100\) .* do not fit 4 tasks and 25 hypotheses"):
+        replace(prepared, hypotheses=fewer)
+    with pytest.raises(ValueError, match="mask over 100 regions"):
+        infer(model, [demonstration(0, 0)], hypotheses=[True])
+    inference = infer(model, [demonstration(0, 0)])
+    for field, value in {
+        "names": ("a", "b"),
+        "phi": np.zeros((2, 100)),
+        "violated": np.zeros((1, 99), bool),
+        "reachable": np.ones(2, bool),
+        "hypotheses": fewer,
+    }.items():
+        with pytest.raises(ValueError, match="do not fit phi"):
+            replace(inference, **{field: value})
+
+
+def test_no_demonstration_leaves_the_prior(model: TabularModel) -> None:
+    inference = infer(model, [], prior_none=0.3)
+    assert inference.posterior_none == pytest.approx(0.3)
+    np.testing.assert_allclose(inference.posterior, 0.7 / 100)

@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import sparse
+from toy_models import toy_model
 
+from mlci.demonstrations import Task
 from mlci.grids import Grid
-from mlci.maxent import (
-    expected_violations,
-    log_partition,
-    policy,
-    reachable,
-    sample_moves,
-    violation_probabilities,
-)
-from mlci.regions import ConstraintSet
-from mlci.spaces import Floats
-from mlci.systems import Pendulum
-from mlci.tabular import TabularMDP, action_grid, discretize, forbid
+from mlci.maxent import TrajectoryDistribution, reachable_cells
+from mlci.regions import Regions
+from mlci.spaces import Box, Floats
+from mlci.systems import DoubleIntegrator, Pendulum
+from mlci.tabular import TabularModel, action_grid, discretize
 
 # Sums of at most 4^5 terms of order 1 in double precision: 1e-12 leaves three digits of room.
 TOLERANCE = 1e-12
 
 
-def toy_mdp(seed: int) -> TabularMDP:
+def toy_world(seed: int) -> TabularModel:
     """Six cells, four moves, three regions; self-loops, moves not allowed, cell 5 out of reach."""
     rng = np.random.default_rng(seed)
     successor = rng.integers(0, 5, size=(6, 4))
@@ -36,17 +31,11 @@ def toy_mdp(seed: int) -> TabularMDP:
     allowed[0, 1] = allowed[0, 2] = True
     successor[1, 1], allowed[1, 1] = -1, False
     crosses = rng.random((6 * 4, 3)) < 0.15
-    return TabularMDP(
-        successor=successor,
-        reward=rng.normal(size=(6, 4)),
-        allowed=allowed,
-        crosses=sparse.csr_matrix(crosses),
-        action=np.arange(4),
-    )
+    return toy_model(successor, rng.normal(size=(6, 4)), allowed, crosses)
 
 
 def enumerate_trajectories(
-    mdp: TabularMDP, start: int, goals: list[int], steps: int
+    mdp: TabularModel, start: int, goals: list[int], steps: int
 ) -> tuple[float, Floats]:
     """Z and, for each region, the part of Z that crosses it, by listing every move sequence."""
     crosses = mdp.crosses.toarray().reshape(mdp.states, mdp.moves, -1)
@@ -66,15 +55,16 @@ def enumerate_trajectories(
     return total, crossing
 
 
-def forward_violation_probabilities(mdp: TabularMDP, log_z: Floats, start: int) -> Floats:
+def forward_violation_probabilities(distribution: TrajectoryDistribution) -> Floats:
     """Phi by pushing the mass that has not yet violated forward from the start."""
+    mdp = distribution.model
     crosses = mdp.crosses.toarray().reshape(mdp.states, mdp.moves, -1)
     clean = np.zeros((mdp.states, crosses.shape[2]))
-    clean[start] = 1.0
+    clean[distribution.start] = 1.0
     violated = np.zeros(crosses.shape[2])
-    for t in range(len(log_z) - 1):
+    for t in range(distribution.steps):
         after = np.zeros_like(clean)
-        for state, chances in zip(*policy(mdp, log_z, t), strict=True):
+        for state, chances in zip(*distribution.policy(t), strict=True):
             for move, chance in enumerate(chances):
                 moving = chance * clean[state]
                 violated += moving * crosses[state, move]
@@ -87,22 +77,21 @@ def forward_violation_probabilities(mdp: TabularMDP, log_z: Floats, start: int) 
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("goals", [[2], [1, 3, 5]])
 def test_four_routes_to_violation_probabilities_agree(seed: int, goals: list[int]) -> None:
-    mdp, start, steps = toy_mdp(seed), 0, 5
+    mdp, start, steps = toy_world(seed), 0, 5
     total, crossing = enumerate_trajectories(mdp, start, goals, steps)
-    log_z = log_partition(mdp, start, goals, steps)
+    distribution = TrajectoryDistribution(mdp, start, goals, steps)
+    assert distribution.is_possible == (total > 0)
     if total == 0:
-        assert log_z[0, start] == -np.inf
+        assert distribution.log_z[0, start] == -np.inf
         return
-    assert log_z[0, start] == pytest.approx(np.log(total), abs=TOLERANCE)
+    assert distribution.log_z[0, start] == pytest.approx(np.log(total), abs=TOLERANCE)
     expected = crossing / total
-    backward = violation_probabilities(mdp, log_z, start)
+    backward = distribution.violation_probabilities()
     np.testing.assert_allclose(backward, expected, rtol=0, atol=TOLERANCE)
-    forward = forward_violation_probabilities(mdp, log_z, start)
+    forward = forward_violation_probabilities(distribution)
     np.testing.assert_allclose(forward, expected, rtol=0, atol=TOLERANCE)
-    by_partition = [
-        1 - np.exp(log_partition(forbid(mdp, i), start, goals, steps)[0, start] - np.log(total))
-        for i in range(3)
-    ]
+    under = [replace(distribution, model=mdp.under(np.arange(3) == i)) for i in range(3)]
+    by_partition = [1 - np.exp(each.log_z[0, start] - np.log(total)) for each in under]
     np.testing.assert_allclose(by_partition, expected, rtol=0, atol=TOLERANCE)
 
 
@@ -114,33 +103,34 @@ def test_blocks_of_any_size_give_the_same_bits(
     """A cell and a region at a time, some of each, or all: no sum is taken in another order."""
     system = Pendulum()
     grid, actions = Grid(system.space, (11, 12)), action_grid(system, 5)
-    regions = ConstraintSet.from_grid(system.space, (5, 7))
+    regions = Regions.from_grid(system.space, (5, 7))
     mdp = discretize(system, grid, actions, 0.5, regions, samples)
-    whole = log_partition(mdp, 40, [90, 91], 10)
-    phi = violation_probabilities(mdp, whole, 40)
+    whole = TrajectoryDistribution(mdp, 40, [90, 91], 10)
+    phi = whole.violation_probabilities()
     assert np.sum((phi > 0.01) & (phi < 0.99)) > 10
     monkeypatch.setattr("mlci.maxent._CELLS_AT_ONCE", cells_at_once)
     monkeypatch.setattr("mlci.maxent.PHI_BYTES", phi_bytes)
-    log_z = log_partition(mdp, 40, [90, 91], 10)
-    np.testing.assert_array_equal(log_z, whole)
-    np.testing.assert_array_equal(violation_probabilities(mdp, log_z, 40), phi)
+    in_blocks = replace(whole)
+    np.testing.assert_array_equal(in_blocks.log_z, whole.log_z)
+    np.testing.assert_array_equal(in_blocks.violation_probabilities(), phi)
 
 
 def test_the_toy_worlds_are_not_trivial() -> None:
     """The agreement above is worth something only if goals are reached and regions crossed."""
     shares = []
     for seed in range(8):
-        total, crossing = enumerate_trajectories(toy_mdp(seed), 0, [1, 3, 5], 5)
+        total, crossing = enumerate_trajectories(toy_world(seed), 0, [1, 3, 5], 5)
         shares.extend(crossing / total if total else [])
     assert len(shares) >= 15
     assert np.mean([0.01 < share < 0.99 for share in shares]) > 0.5
 
 
 def test_policy_is_a_distribution_over_allowed_moves_that_stay_on_course() -> None:
-    mdp = toy_mdp(3)
-    log_z = log_partition(mdp, 0, [2], 5)
+    mdp = toy_world(3)
+    distribution = TrajectoryDistribution(mdp, 0, [2], 5)
+    log_z = distribution.log_z
     for t in range(5):
-        cells, chances = policy(mdp, log_z, t)
+        cells, chances = distribution.policy(t)
         np.testing.assert_allclose(chances.sum(axis=1), 1.0, atol=1e-15)
         assert np.all(chances[~mdp.allowed[cells]] == 0)
         taken = np.argwhere(chances > 0)
@@ -150,63 +140,81 @@ def test_policy_is_a_distribution_over_allowed_moves_that_stay_on_course() -> No
 def test_only_cells_between_start_and_goal_carry_probability() -> None:
     """On a one-way corridor each step has one possible cell, and a late goal none."""
     cells = 6
-    mdp = TabularMDP(
-        successor=np.minimum(np.arange(cells) + 1, cells - 1)[:, None],
-        reward=np.zeros((cells, 1)),
-        allowed=np.ones((cells, 1), dtype=bool),
-        crosses=sparse.csr_matrix((cells, 1), dtype=bool),
-        action=np.zeros(1, dtype=np.int64),
+    corridor = toy_model(
+        np.minimum(np.arange(cells) + 1, cells - 1)[:, None],
+        np.zeros((cells, 1)),
+        np.ones((cells, 1), dtype=bool),
+        np.zeros((cells, 1), dtype=bool),
     )
-    assert [part.tolist() for part in reachable(mdp, 1, 3)] == [[1], [2], [3], [4]]
-    log_z = log_partition(mdp, 1, 4, 3)
+    assert [part.tolist() for part in reachable_cells(corridor, 1, 3)] == [[1], [2], [3], [4]]
+    log_z = TrajectoryDistribution(corridor, 1, 4, 3).log_z
     assert np.argwhere(np.isfinite(log_z)).tolist() == [[0, 1], [1, 2], [2, 3], [3, 4]]
-    assert log_partition(mdp, 1, 5, 3)[0, 1] == -np.inf
+    assert not TrajectoryDistribution(corridor, 1, 5, 3).is_possible
 
 
-def test_an_unreachable_goal_is_refused_not_nan() -> None:
-    mdp = toy_mdp(0)
-    log_z = log_partition(mdp, 0, [5], 4)
-    assert log_z[0, 0] == -np.inf
-    assert not np.any(np.isnan(log_z))
-    with pytest.raises(ValueError, match="no trajectory from cell 0 reaches a goal"):
-        violation_probabilities(mdp, log_z, 0)
-    with pytest.raises(ValueError, match="no trajectory from cell 0 reaches a goal"):
-        sample_moves(mdp, log_z, 0, 3, np.random.default_rng(0))
+@pytest.mark.parametrize("goal", [[5], []], ids=["out of reach", "no cell"])
+def test_an_unreachable_goal_is_refused_not_nan(goal: list[int]) -> None:
+    distribution = TrajectoryDistribution(toy_world(0), 0, goal, 4)
+    assert not distribution.is_possible
+    assert distribution.log_z[0, 0] == -np.inf
+    assert not np.any(np.isnan(distribution.log_z))
+    with pytest.raises(ValueError, match="no trajectory from cell 0 reaches a goal: Phi"):
+        distribution.violation_probabilities()
+    with pytest.raises(ValueError, match="no trajectory from cell 0 reaches a goal: nothing"):
+        distribution.sample(3, np.random.default_rng(0))
 
 
-def test_a_start_outside_the_grid_is_refused() -> None:
-    with pytest.raises(ValueError, match="a cell from 0 to 5, not -1"):
-        log_partition(toy_mdp(0), -1, [1], 3)
+@pytest.mark.parametrize(
+    ("start", "goal", "steps", "message"),
+    [
+        (-1, [1], 3, "start must be a cell from 0 to 5, not -1"),
+        (6, [1], 3, "start must be a cell from 0 to 5, not 6"),
+        (0, [-1], 3, r"goals must be cells from 0 to 5, not \[-1\]"),
+        (0, [1, 6], 3, r"goals must be cells from 0 to 5, not \[1, 6\]"),
+        (0, [1], 0, "at least one step, not 0"),
+    ],
+)
+def test_what_is_no_cell_is_refused(start: int, goal: list[int], steps: int, message: str) -> None:
+    TrajectoryDistribution(toy_world(0), 5, [0, 5], 1)
+    with pytest.raises(ValueError, match=message):
+        TrajectoryDistribution(toy_world(0), start, goal, steps)
+
+
+def test_a_task_is_taken_to_its_cells() -> None:
+    system = DoubleIntegrator()
+    grid = Grid(system.space, (12, 10))
+    model = discretize(
+        system, grid, action_grid(system, 3), 0.5, Regions.from_grid(system.space, (2, 2))
+    )
+    goal = Box([0.2, -np.inf], [0.8, np.inf])
+    distribution = TrajectoryDistribution.of_task(model, Task([-1.0, 0.3], goal, 4.0))
+    assert distribution.start == grid.index([-1.0, 0.3])
+    assert distribution.goal.tolist() == grid.cells_in(goal).tolist()
+    assert distribution.steps == 8
+    rounded = Task([-1.0, 0.3], goal, 4.0004)
+    assert TrajectoryDistribution.of_task(model, rounded).steps == 8
+    off = Task([-1.0, 0.3], goal, 4.2)
+    with pytest.raises(ValueError, match=r"0.5 s does not divide the horizon of 4.2 s"):
+        TrajectoryDistribution.of_task(model, off)
+    assert TrajectoryDistribution.of_task(model, off, round_horizon=True).steps == 8
+    short = Task([-1.0, 0.3], goal, 0.2)
+    assert TrajectoryDistribution.of_task(model, short, round_horizon=True).steps == 1
+    with pytest.raises(ValueError, match="lies outside the state space"):
+        TrajectoryDistribution.of_task(model, Task([-9.0, 0.0], goal, 4.0))
 
 
 def test_sampled_trajectories_follow_the_distribution() -> None:
     """Frequencies against Phi, to four standard errors of 20 000 draws."""
-    mdp = toy_mdp(2)
-    log_z = log_partition(mdp, 0, [1, 3], 5)
+    mdp = toy_world(2)
+    distribution = TrajectoryDistribution(mdp, 0, [1, 3], 5)
     count = 20_000
-    cells, moves = sample_moves(mdp, log_z, 0, count, np.random.default_rng(1))
+    cells, moves = distribution.sample(count, np.random.default_rng(1))
     assert np.all(np.isin(cells[:, -1], [1, 3]))
     np.testing.assert_array_equal(cells[:, 1:], mdp.successor[cells[:, :-1], moves])
     rows = (cells[:, :-1] * mdp.moves + moves).ravel()
     crossed = mdp.crosses.toarray()[rows].reshape(count, 5, -1).any(axis=1)
-    phi = violation_probabilities(mdp, log_z, 0)
+    phi = distribution.violation_probabilities()
     error = np.sqrt(phi * (1 - phi) / count)
     assert np.all(np.abs(crossed.mean(axis=0) - phi) <= 4 * error + 1e-12)
     first = np.bincount(moves[:, 0], minlength=mdp.moves) / count
-    np.testing.assert_allclose(first, policy(mdp, log_z, 0)[1][0], atol=4 * 0.5 / np.sqrt(count))
-
-
-def test_several_tasks_are_each_alone() -> None:
-    """One that cannot be done has zeros, and progress is told after each."""
-    mdp = toy_mdp(0)
-    told: list[tuple[int, int]] = []
-    goals = [[2], [5], [1, 3]]
-    phi, reached = expected_violations(
-        mdp, [0, 0, 1], goals, [5, 4, 3], progress=lambda *count: told.append(count)
-    )
-    assert told == [(1, 3), (2, 3), (3, 3)]
-    assert reached.tolist() == [True, False, True]
-    assert not phi[1].any()
-    for j, (start, steps) in {0: (0, 5), 2: (1, 3)}.items():
-        total, crossing = enumerate_trajectories(mdp, start, goals[j], steps)
-        np.testing.assert_allclose(phi[j], crossing / total, rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(first, distribution.policy(0)[1][0], atol=4 * 0.5 / np.sqrt(count))

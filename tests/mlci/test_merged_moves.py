@@ -1,4 +1,4 @@
-"""Moves that nothing tells apart, taken together, against one cell and one move at a time."""
+"""Merged moves, against one cell and one move at a time."""
 
 from __future__ import annotations
 
@@ -7,35 +7,35 @@ import pytest
 from scipy.special import logsumexp
 
 from mlci.grids import Grid
-from mlci.maxent import log_partition, violation_probabilities
-from mlci.regions import ConstraintSet
+from mlci.maxent import TrajectoryDistribution
+from mlci.regions import Regions
 from mlci.systems import DoubleIntegrator, Pendulum
-from mlci.tabular import TabularMDP, action_grid, discretize, forbid
+from mlci.tabular import TabularModel, action_grid, discretize
 
 
-def of_cell(mdp: TabularMDP, cell: int) -> dict[tuple[int, frozenset[int]], float]:
-    """Its ways by where they lead and what they cross, with their weights."""
-    ways = mdp.ways
-    entries = slice(*ways.crossing_begins[cell : cell + 2])
-    certain = ways.certain_region[slice(*ways.certain_begins[cell : cell + 2])]
-    found = {}
-    for way in range(*ways.begins[cell : cell + 2]):
-        mine = ways.crossing_region[entries][ways.crossing_way[entries] == way]
+def of_cell(mdp: TabularModel, cell: int) -> dict[tuple[int, frozenset[int]], float]:
+    """Its merged moves by where they lead and what they cross, with their weights."""
+    merged = mdp.merged
+    entries = slice(*merged.crossing_begins[cell : cell + 2])
+    certain = merged.certain_region[slice(*merged.certain_begins[cell : cell + 2])]
+    weights: dict[tuple[int, frozenset[int]], float] = {}
+    for move in range(*merged.begins[cell : cell + 2]):
+        mine = merged.crossing_region[entries][merged.crossing_move[entries] == move]
         assert not set(mine) & set(certain)
-        key = (int(ways.successor[way]), frozenset([*mine.tolist(), *certain.tolist()]))
-        assert key not in found
-        found[key] = float(ways.log_weight[way])
-    return found
+        key = (int(merged.successor[move]), frozenset([*mine.tolist(), *certain.tolist()]))
+        assert key not in weights
+        weights[key] = float(merged.log_weight[move])
+    return weights
 
 
 @pytest.mark.parametrize("samples", [1, 3])
 @pytest.mark.parametrize("at_once", [1, 40, 1 << 17])
-def test_ways_are_the_moves_of_one_successor_and_the_same_regions(
+def test_merged_moves_have_one_successor_and_the_same_regions(
     monkeypatch: pytest.MonkeyPatch, at_once: int, samples: int
 ) -> None:
     system = DoubleIntegrator()
     grid = Grid(system.space, (6, 5))
-    regions = ConstraintSet.from_grid(system.space, (4, 3))
+    regions = Regions.from_grid(system.space, (4, 3))
     mdp = discretize(system, grid, action_grid(system, 5), 0.8, regions, samples)
     crosses = mdp.crosses.toarray().reshape(grid.size, mdp.moves, len(regions))
     monkeypatch.setattr("mlci.tabular._MOVES_AT_ONCE", at_once)
@@ -55,42 +55,39 @@ def test_ways_are_the_moves_of_one_successor_and_the_same_regions(
         for key, weight in found.items():
             assert weight == pytest.approx(logsumexp(rewards[key]), rel=1e-12, abs=1e-12)
     assert merged > 0
-    assert len(mdp.ways.certain_region) > 0
+    assert len(mdp.merged.certain_region) > 0
 
 
-def test_a_cell_that_every_move_leaves_the_space_from_has_no_way() -> None:
+def test_a_cell_that_every_move_leaves_the_space_from_has_no_merged_move() -> None:
     system = DoubleIntegrator(control_limit=0.1)
     grid = Grid(system.space, (3, 3))
-    regions = ConstraintSet.from_grid(system.space, (3, None))
+    regions = Regions.from_grid(system.space, (3, None))
     mdp = discretize(system, grid, action_grid(system, 3), 2.0, regions)
     stuck = ~mdp.allowed.any(axis=1)
     assert 0 < stuck.sum() < grid.size
-    np.testing.assert_array_equal(np.diff(mdp.ways.begins) == 0, stuck)
+    np.testing.assert_array_equal(np.diff(mdp.merged.begins) == 0, stuck)
     start = int(np.flatnonzero(stuck)[0])
-    assert log_partition(mdp, start, np.arange(grid.size), 1)[0, start] == -np.inf
+    assert not TrajectoryDistribution(mdp, start, np.arange(grid.size), 1).is_possible
 
 
-def test_forbidden_ways_are_those_of_the_forbidden_moves() -> None:
-    """Taken from the ways of the free model, or made anew from what is still allowed."""
+def test_forbidden_merged_moves_are_those_of_the_forbidden_moves() -> None:
+    """Taken from the merged moves of the free model, or made anew from what is still allowed."""
     system = Pendulum()
     grid, actions = Grid(system.space, (8, 8)), action_grid(system, 3)
-    regions = ConstraintSet.from_grid(system.space, (4, 4))
+    regions = Regions.from_grid(system.space, (4, 4))
     mdp = discretize(system, grid, actions, 0.5, regions, samples=2)
-    fresh = forbid(mdp, [5, 6])
-    assert "ways" not in vars(fresh)
-    assert len(mdp.ways.successor) > 0
-    kept = forbid(mdp, [5, 6])
-    assert kept.ways.successor is mdp.ways.successor
+    truth = regions.mask(["5", "6"])
+    fresh = mdp.under(truth)
+    assert "merged" not in vars(fresh)
+    assert len(mdp.merged.successor) > 0
+    derived = mdp.under(truth)
+    assert derived.merged.successor is mdp.merged.successor
     for cell in range(grid.size):
-        free = {key: w for key, w in of_cell(kept, cell).items() if w > -np.inf}
+        free = {key: w for key, w in of_cell(derived, cell).items() if w > -np.inf}
         assert free == of_cell(fresh, cell)
-    start, goal = 3, 60
-    log_z = log_partition(kept, start, goal, 6)
-    np.testing.assert_allclose(log_z, log_partition(fresh, start, goal, 6), rtol=1e-12)
-    assert log_z[0, start] > -np.inf
+    one, other = (TrajectoryDistribution(model, 3, 60, 6) for model in (derived, fresh))
+    np.testing.assert_allclose(one.log_z, other.log_z, rtol=1e-12)
+    assert one.is_possible
     np.testing.assert_allclose(
-        violation_probabilities(kept, log_z, start),
-        violation_probabilities(fresh, log_z, start),
-        rtol=1e-12,
-        atol=1e-15,
+        one.violation_probabilities(), other.violation_probabilities(), rtol=1e-12, atol=1e-15
     )

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from mlci.grids import Grid
-from mlci.reachability import SafeSet, solve
-from mlci.regions import ConstraintSet
+from mlci.reachability import SafeSet, solve_safe_set
+from mlci.regions import Regions
 from mlci.simulate import rk4_step
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator, Pendulum, System
@@ -67,7 +67,7 @@ class Line(System):
 
 
 def region(system, corners):
-    return ConstraintSet(system.space, [corners[0]], [corners[1]])
+    return Regions(system.space, [corners[0]], [corners[1]])
 
 
 def orders(errors, counts):
@@ -80,7 +80,7 @@ def test_a_drift_that_control_cannot_hold_moves_the_border_against_it(control_li
     system, horizon = Drift(control_limit), 0.7
     grid = Grid(system.space, (40, 3, 4))
     keep_out = region(system, ((-2.0, -FREE, -FREE), (0.0, FREE, FREE)))
-    safe_set = solve(system, grid, keep_out, horizon=horizon)
+    safe_set = solve_safe_set(system, grid, keep_out, horizon=horizon)
     # Left of -1 the distance to K is measured to its other side.
     expected = grid.centers[:, 0] - (1 - control_limit) * horizon
     clear = expected > -0.5
@@ -96,7 +96,7 @@ def test_the_border_wraps_round_a_circle():
     x = np.linspace(-3, 3, 101)[:, None]
     late = np.linspace(0, 1.5, 301)
     expected = np.min(keep_out.signed_distance(x[:, None] - late[:, None]), axis=1)
-    values = solve(system, Grid(system.space, (240,)), keep_out, horizon=1.5).value(x)
+    values = solve_safe_set(system, Grid(system.space, (240,)), keep_out, horizon=1.5).value(x)
     np.testing.assert_allclose(values, expected, atol=0.06)
 
 
@@ -105,7 +105,9 @@ def test_smooth_parts_converge_at_second_order():
     errors = []
     for count in counts:
         grid = Grid(system.space, (count,))
-        values = solve(system, grid, region(system, ([-3.0], [-1.0])), horizon=horizon).values
+        values = solve_safe_set(
+            system, grid, region(system, ([-3.0], [-1.0])), horizon=horizon
+        ).values
         x = grid.centers[:, 0]
         exact = 2 * np.tan(np.arctan(x / 2) - horizon / 2) + 1
         errors.append(np.abs(values - exact)[exact > -0.5].mean())
@@ -129,7 +131,7 @@ def test_the_double_integrator_has_its_braking_parabola():
     errors = []
     for count in counts:
         grid = Grid(system.space, (count, count))
-        safe_set = solve(system, grid, keep_out)
+        safe_set = solve_safe_set(system, grid, keep_out)
         exact = braking_value(grid.centers)
         errors.append(np.abs(safe_set.values - exact)[np.abs(exact) < 0.1].mean())
         states = np.random.default_rng(0).uniform(-2.9, 2.9, (20_000, 2))
@@ -142,7 +144,9 @@ def test_the_double_integrator_has_its_braking_parabola():
 def test_the_value_never_grows_with_the_horizon():
     grid, keep_out = Grid(PENDULUM.space, (41, 41)), region(PENDULUM, BOTTOM)
     start = keep_out.signed_distance(grid.centers)
-    values = [solve(PENDULUM, grid, keep_out, horizon=tau).values for tau in (0, 0.3, 1, 3)]
+    values = [
+        solve_safe_set(PENDULUM, grid, keep_out, horizon=tau).values for tau in (0, 0.3, 1, 3)
+    ]
     np.testing.assert_array_equal(values[0], start)
     for sooner, later in itertools.pairwise(values):
         assert np.all(later <= sooner + 1e-9)
@@ -151,8 +155,8 @@ def test_the_value_never_grows_with_the_horizon():
 
 def test_a_fixed_point_stands_still():
     grid, keep_out = Grid(PENDULUM.space, (41, 41)), region(PENDULUM, BOTTOM)
-    settled = solve(PENDULUM, grid, keep_out).values
-    late = solve(PENDULUM, grid, keep_out, horizon=30.0).values
+    settled = solve_safe_set(PENDULUM, grid, keep_out).values
+    late = solve_safe_set(PENDULUM, grid, keep_out, horizon=30.0).values
     near = np.abs(settled) < 0.3
     np.testing.assert_allclose(settled[near], late[near], atol=0.002)
 
@@ -194,7 +198,7 @@ def near_border(safe_set, count, cells=(2, 4)):
 @pytest.mark.parametrize("system", [PENDULUM, WEAK_PENDULUM])
 def test_brute_force_agrees_on_both_sides_of_the_border(system, corners):
     keep_out = region(system, corners)
-    safe_set = solve(system, Grid(system.space, (101, 101)), keep_out)
+    safe_set = solve_safe_set(system, Grid(system.space, (101, 101)), keep_out)
     inside, doomed = near_border(safe_set, 20)
     assert len(inside) == len(doomed) == 20
     assert np.all(survivors(system, keep_out, inside, 6.0))
@@ -222,7 +226,7 @@ def test_the_border_is_that_of_the_best_constant_control(corners):
     near = np.abs(exact) < 0.1
     errors = []
     for count in counts:
-        safe_set = solve(PENDULUM, Grid(PENDULUM.space, (count, count)), keep_out)
+        safe_set = solve_safe_set(PENDULUM, Grid(PENDULUM.space, (count, count)), keep_out)
         errors.append(np.abs(safe_set.value(states[near]) - exact[near]).mean())
     assert errors[1] < 0.003
     assert np.all(orders(errors, counts) > 1.0)
@@ -231,19 +235,19 @@ def test_the_border_is_that_of_the_best_constant_control(corners):
 def test_impossible_problems_are_refused():
     grid, keep_out = Grid(PENDULUM.space, (11, 11)), region(PENDULUM, BOTTOM)
     with pytest.raises(ValueError, match="horizon must be at least 0 s, not -1"):
-        solve(PENDULUM, grid, keep_out, horizon=-1)
+        solve_safe_set(PENDULUM, grid, keep_out, horizon=-1)
     with pytest.raises(ValueError, match="tolerance must be positive, not 0"):
-        solve(PENDULUM, grid, keep_out, tolerance=0)
+        solve_safe_set(PENDULUM, grid, keep_out, tolerance=0)
     needle = region(PENDULUM, ((3.0, 0.0), (3.01, 0.01)))
     with pytest.raises(ValueError, match=r"region 1 must hold .* a \[11, 11\] grid"):
-        solve(PENDULUM, grid, keep_out.joined(needle))
+        solve_safe_set(PENDULUM, grid, keep_out.joined(needle))
     everything = region(PENDULUM, ((-FREE, -FREE), (FREE, FREE)))
     with pytest.raises(ValueError, match="not the whole space"):
-        solve(PENDULUM, grid, everything)
+        solve_safe_set(PENDULUM, grid, everything)
     slow = Drift(control_limit=0.999)
     drifting = region(slow, ((-2.0, -FREE, -FREE), (0.0, FREE, FREE)))
     with pytest.raises(RuntimeError, match=r"falls by 0\.001 per second after 100 s"):
-        solve(slow, Grid(slow.space, (40, 3, 4)), drifting, tolerance=1e-4)
+        solve_safe_set(slow, Grid(slow.space, (40, 3, 4)), drifting, tolerance=1e-4)
 
 
 def test_a_safe_set_checks_its_arrays():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlci import regions as constraints
-from mlci.regions import ConstraintSet
+from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 
 TURN = 2 * np.pi
@@ -19,12 +19,12 @@ TORUS_AND_LINE = StateSpace(
 FREE = (-np.inf, np.inf)
 
 
-def regions(space: StateSpace, *sides: tuple[tuple[float, float], ...]) -> ConstraintSet:
+def regions(space: StateSpace, *sides: tuple[tuple[float, float], ...]) -> Regions:
     """One region for each tuple of sides (lower, upper)."""
-    return ConstraintSet.from_boxes(space, [Box(*np.array(box, dtype=float).T) for box in sides])
+    return Regions.from_boxes(space, [Box(*np.array(box, dtype=float).T) for box in sides])
 
 
-def meets(region_set: ConstraintSet, points: np.ndarray) -> np.ndarray:
+def meets(region_set: Regions, points: np.ndarray) -> np.ndarray:
     """Whether points (..., n) lie strictly inside each region's copies, (..., C)."""
     space = region_set.space
     inside = np.zeros((*points.shape[:-1], len(region_set)), dtype=bool)
@@ -34,15 +34,15 @@ def meets(region_set: ConstraintSet, points: np.ndarray) -> np.ndarray:
     return inside
 
 
-def shrunk(region_set: ConstraintSet, by: float) -> ConstraintSet:
-    return ConstraintSet(region_set.space, region_set.lower + by, region_set.upper - by)
+def shrunk(region_set: Regions, by: float) -> Regions:
+    return Regions(region_set.space, region_set.lower + by, region_set.upper - by)
 
 
 @pytest.mark.parametrize(
     "region_set",
     [
-        ConstraintSet.from_grid(CYLINDER, (10, 10)),
-        ConstraintSet.from_grid(CYLINDER, (None, 7)),
+        Regions.from_grid(CYLINDER, (10, 10)),
+        Regions.from_grid(CYLINDER, (None, 7)),
         regions(
             CYLINDER,
             ((5.5, 7.2), (-2.0, 1.0)),  # across the wrap
@@ -53,7 +53,7 @@ def shrunk(region_set: ConstraintSet, by: float) -> ConstraintSet:
             ((3.0, 4.0), FREE),
             ((2.0, 3.5), (-1.0, 9.0)),  # beyond the bounds, overlapping
         ),
-        ConstraintSet.from_grid(TORUS_AND_LINE, (3, None, 4)),
+        Regions.from_grid(TORUS_AND_LINE, (3, None, 4)),
         regions(
             TORUS_AND_LINE,
             ((0.7, 1.4), (-1.0, 1.0), (2.5, 3.5)),  # across both wraps
@@ -90,7 +90,7 @@ def test_crossings_agree_with_dense_sampling(region_set):
 
 def test_a_path_may_be_wrapped_or_not():
     rng = np.random.default_rng(1)
-    region_set = ConstraintSet.from_grid(CYLINDER, (10, 10))
+    region_set = Regions.from_grid(CYLINDER, (10, 10))
     paths = np.cumsum(rng.uniform(-0.9, 1.2, size=(4, 3, 25, 2)), axis=-2) * [1.0, 0.3]
     violated = region_set.violated_by(paths)
     assert violated.shape == (4, 3, 100)
@@ -146,7 +146,7 @@ def test_a_path_of_one_sample_is_a_point():
 
 def test_chords_count_for_their_owner_in_blocks_of_any_size(monkeypatch):
     rng = np.random.default_rng(2)
-    region_set = ConstraintSet.from_grid(CYLINDER, (8, 6))
+    region_set = Regions.from_grid(CYLINDER, (8, 6))
     starts = rng.uniform([0, -6], [TURN, 6], size=(90, 2))
     steps = rng.normal(scale=0.5, size=(90, 2))
     owner = rng.integers(0, 12, size=90)
@@ -159,7 +159,7 @@ def test_chords_count_for_their_owner_in_blocks_of_any_size(monkeypatch):
 
 
 def test_no_chords_cross_nothing():
-    region_set = ConstraintSet.from_grid(CYLINDER, (2, 2))
+    region_set = Regions.from_grid(CYLINDER, (2, 2))
     nothing = region_set.crossings(np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=int), 3)
     assert nothing.shape == (3, 4)
     assert nothing.nnz == 0
@@ -168,7 +168,7 @@ def test_no_chords_cross_nothing():
 def test_a_grid_of_regions_covers_every_point_once():
     states = np.random.default_rng(3).uniform([-9, -6], [9, 6], size=(300, 2))
     for shape in ((10, 10), (None, 4), (3, None)):
-        region_set = ConstraintSet.from_grid(CYLINDER, shape)
+        region_set = Regions.from_grid(CYLINDER, shape)
         assert len(region_set) == np.prod([count or 1 for count in shape])
         np.testing.assert_array_equal(region_set.violated_by(states[:, None]).sum(axis=-1), 1)
         free = [count is None for count in shape]
@@ -191,7 +191,7 @@ def test_inside_agrees_with_sampled_points():
         ((1.0, 2.0), (0.0, 1.0)),
         ((1.0, 2.0), (-7.0, -5.0)),  # reaches out of the state space
     )
-    hypotheses = ConstraintSet.from_grid(CYLINDER, (20, 24)).joined(
+    hypotheses = Regions.from_grid(CYLINDER, (20, 24)).joined(
         regions(
             CYLINDER,
             ((1.2, 1.8), (0.2, 0.8)),
@@ -221,7 +221,7 @@ def test_overlaps_agrees_with_sampled_points():
     truth = regions(
         CYLINDER, ((5.0, 7.6), (-3.0, 0.0)), (FREE, (4.0, 9.0)), ((1.0, 2.0), (0.0, 1.0))
     )
-    hypotheses = ConstraintSet.from_grid(CYLINDER, (20, 24)).joined(
+    hypotheses = Regions.from_grid(CYLINDER, (20, 24)).joined(
         regions(
             CYLINDER,
             ((1.2, 1.8), (0.2, 0.8)),
@@ -242,14 +242,14 @@ def test_overlaps_agrees_with_sampled_points():
     )
     share = np.random.default_rng(5).uniform(0.001, 0.999, size=(400, 2))
 
-    def points(one: ConstraintSet, index: int) -> np.ndarray:
+    def points(one: Regions, index: int) -> np.ndarray:
         box = one.box(index)
         free = np.isinf(box.lower)
         lower, upper = np.where(free, [[0.0, -6.0], [TURN, 6.0]], [box.lower, box.upper])
         drawn = lower + share * (upper - lower)
         return drawn[np.abs(drawn[:, 1]) < 6.0]
 
-    def expected(one: ConstraintSet, other: ConstraintSet) -> list[bool]:
+    def expected(one: Regions, other: Regions) -> list[bool]:
         drawn = np.concatenate([points(other, j) for j in range(len(other))])
         in_other = [meets(other, points(one, i)).any() for i in range(len(one))]
         return (np.array(in_other) | meets(one, drawn).any(axis=0)).tolist()
@@ -268,26 +268,24 @@ def test_overlaps_is_to_share_a_cell_of_a_lattice(seed):
     centres = np.stack(np.meshgrid(np.arange(12), np.arange(24)), axis=-1).reshape(-1, 2) + 0.5
     centres = centres * step - [0.0, 6.0]
 
-    def drawn() -> ConstraintSet:
+    def drawn() -> Regions:
         lower = rng.integers([-12, -6], [18, 28], size=(60, 2))
         upper = lower + rng.integers([1, 1], [16, 9], size=(60, 2))
         lower, upper = (corner * step - [0.0, 6.0] for corner in (lower, upper))
         free = rng.random((60, 2)) < 0.05
-        return ConstraintSet(
-            CYLINDER, np.where(free, -np.inf, lower), np.where(free, np.inf, upper)
-        )
+        return Regions(CYLINDER, np.where(free, -np.inf, lower), np.where(free, np.inf, upper))
 
     one, other = drawn(), drawn()
     shared = meets(one, centres).T.astype(int) @ meets(other, centres).astype(int) > 0
     assert 0.1 < shared.mean() < 0.9
     for j in range(60):
-        alone = ConstraintSet(CYLINDER, other.lower[[j]], other.upper[[j]])
+        alone = Regions(CYLINDER, other.lower[[j]], other.upper[[j]])
         np.testing.assert_array_equal(one.overlaps(alone), shared[:, j])
     np.testing.assert_array_equal(other.overlaps(one), shared.any(axis=0))
 
 
 def test_no_regions_are_entered_by_nothing_and_far_from_everywhere():
-    nothing = ConstraintSet.from_boxes(CYLINDER, [])
+    nothing = Regions.from_boxes(CYLINDER, [])
     some = regions(CYLINDER, ((1.0, 2.0), (0.0, 1.0)))
     paths = np.random.default_rng(0).uniform(-3, 3, size=(4, 9, 2))
     assert len(nothing) == 0
@@ -323,4 +321,4 @@ def test_joined_keeps_the_order():
 )
 def test_regions_that_make_no_sense_are_refused(lower, upper, message):
     with pytest.raises(ValueError, match=message):
-        ConstraintSet(CYLINDER, np.array(lower), np.array(upper))
+        Regions(CYLINDER, np.array(lower), np.array(upper))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mlci.grids import Grid
-from mlci.reachability import SafeSet, solve
-from mlci.regions import ConstraintSet
+from mlci.reachability import SafeSet, solve_safe_set
+from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import euler_step
 from mlci.systems import DoubleIntegrator, Pendulum
@@ -19,13 +19,13 @@ WIDTHS = [0.0, 0.2]
 
 
 def region(corners):
-    return ConstraintSet(PENDULUM.space, [corners[0]], [corners[1]])
+    return Regions(PENDULUM.space, [corners[0]], [corners[1]])
 
 
 @cache
 def safe_set(corners, control_limit=2.0, count=101):
     system = Pendulum(control_limit=control_limit)
-    return solve(system, Grid(system.space, (count, count)), region(corners))
+    return solve_safe_set(system, Grid(system.space, (count, count)), region(corners))
 
 
 def near_border(omega, margin, count, seed=0):

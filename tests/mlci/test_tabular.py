@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import sparse
 from scipy.integrate import solve_ivp
+from toy_models import toy_model
 
 from mlci.grids import Grid
-from mlci.maxent import log_partition, violation_probabilities
-from mlci.regions import ConstraintSet
+from mlci.maxent import TrajectoryDistribution
+from mlci.regions import Regions
 from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator, Pendulum, System
-from mlci.tabular import TabularMDP, action_grid, discretize, forbid
+from mlci.tabular import action_grid, discretize
 
 
 def reference_segment(system: System, start: np.ndarray, control: np.ndarray, dt: float):
@@ -34,7 +37,7 @@ def reference_segment(system: System, start: np.ndarray, control: np.ndarray, dt
 )
 def test_moves_match_an_ode_solver(system: System, shape: tuple[int, int], dt: float) -> None:
     grid, actions = Grid(system.space, shape), action_grid(system, 3)
-    regions = ConstraintSet.from_grid(system.space, (10, 10))
+    regions = Regions.from_grid(system.space, (10, 10))
     mdp = discretize(system, grid, actions, dt, regions)
     crosses = mdp.crosses.toarray().reshape(grid.size, 3, -1)
     checked = 0
@@ -73,19 +76,19 @@ def test_a_thin_constraint_between_a_cell_and_its_successor_is_caught() -> None:
     cell = int(grid.index([1.0, 4.0]))
     path = reference_segment(system, grid.centers[cell], actions[2], 0.5)
     middle, width = path[1000], grid.widths / 10
-    thin = ConstraintSet.from_boxes(system.space, [Box(middle - width / 2, middle + width / 2)])
+    thin = Regions.from_boxes(system.space, [Box(middle - width / 2, middle + width / 2)])
     mdp = discretize(system, grid, actions, 0.5, thin)
     assert grid.index(path[-1]) == mdp.successor[cell, 2]
     assert int(grid.index(middle)) not in (cell, mdp.successor[cell, 2])
     assert mdp.crosses.toarray().reshape(grid.size, 5)[cell, 2]
-    assert not forbid(mdp, 0).allowed[cell, 2]
+    assert not mdp.under([True]).allowed[cell, 2]
 
 
 def test_a_path_that_leaves_the_bounds_and_returns_is_not_allowed() -> None:
     """Thrown up against the limit of position, the mass would come back within the step."""
     system = DoubleIntegrator(position_limit=1.0, speed_limit=2.0, control_limit=2.0)
     grid = Grid(system.space, (10, 10))
-    mdp = discretize(system, grid, [[-2.0]], 1.0, ConstraintSet.from_grid(system.space, (2, 2)))
+    mdp = discretize(system, grid, [[-2.0]], 1.0, Regions.from_grid(system.space, (2, 2)))
     cell = int(grid.index([0.9, 1.0]))
     end = reference_segment(system, grid.centers[cell], np.array([-2.0]), 1.0)[-1]
     assert system.space.contains(end)
@@ -96,7 +99,7 @@ def test_cell_averaged_model_is_the_mixture_over_start_points() -> None:
     """Phi of the k = 2 model equals that of the MDP whose actions are (action, start) pairs."""
     system = DoubleIntegrator()
     grid, actions = Grid(system.space, (6, 6)), action_grid(system, 3)
-    regions = ConstraintSet.from_grid(system.space, (3, 3))
+    regions = Regions.from_grid(system.space, (3, 3))
     averaged = discretize(system, grid, actions, 1.0, regions, samples=2)
     assert averaged.moves == 3 * 4
     np.testing.assert_array_equal(averaged.action, np.repeat(np.arange(3), 4))
@@ -106,15 +109,15 @@ def test_cell_averaged_model_is_the_mixture_over_start_points() -> None:
         end = end + np.array([0.5, 1.0]) * actions[move // 4]
         expected = np.where(averaged.allowed[:, move], grid.index(end), -1)
         np.testing.assert_array_equal(averaged.successor[:, move], expected)
-    log_z = log_partition(averaged, 14, [21], 4)
-    assert np.isfinite(log_z[0, 14])
-    assert np.all(violation_probabilities(averaged, log_z, 14) <= 1)
+    distribution = TrajectoryDistribution(averaged, 14, [21], 4)
+    assert distribution.is_possible
+    assert np.all(distribution.violation_probabilities() <= 1)
 
 
 def test_one_sample_is_the_centre_model() -> None:
     system = Pendulum()
     grid = Grid(system.space, (8, 8))
-    regions = ConstraintSet.from_grid(system.space, (4, 4))
+    regions = Regions.from_grid(system.space, (4, 4))
     actions = action_grid(system, 3)
     centre = discretize(system, grid, actions, 0.5, regions)
     # An odd subdivision has the centre as its middle point.
@@ -129,7 +132,7 @@ def test_blocks_of_cells_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) ->
         Grid(system.space, (7, 9)),
         action_grid(system, 3),
         0.5,
-        ConstraintSet.from_grid(system.space, (5, 5)),
+        Regions.from_grid(system.space, (5, 5)),
     )
     whole = discretize(*arguments, samples=2)
     monkeypatch.setattr("mlci.tabular._MOVES_AT_ONCE", 50)
@@ -150,7 +153,7 @@ def test_temperature_divides_the_reward() -> None:
         Grid(system.space, (4, 4)),
         action_grid(system, 3),
         0.5,
-        ConstraintSet.from_grid(system.space, (2, 2)),
+        Regions.from_grid(system.space, (2, 2)),
     )
     cold = discretize(*arguments, temperature=0.5)
     np.testing.assert_allclose(cold.reward, 2 * discretize(*arguments).reward)
@@ -159,23 +162,53 @@ def test_temperature_divides_the_reward() -> None:
 def test_action_grid_spans_the_control_box() -> None:
     np.testing.assert_allclose(action_grid(Pendulum(), 5)[:, 0], [-2, -1, 0, 1, 2])
     np.testing.assert_allclose(action_grid(Pendulum(), [1]), [[0.0]])
+    for count in (np.int64(3), [np.int64(3)], np.array([3])):
+        np.testing.assert_allclose(action_grid(Pendulum(), count)[:, 0], [-2, 0, 2])
+    with pytest.raises(ValueError, match=r"whole counts of at least 1, not 2\.5"):
+        action_grid(Pendulum(), 2.5)
     with pytest.raises(ValueError, match="counts of at least 1, not"):
         action_grid(Pendulum(), 0)
     with pytest.raises(ValueError, match="counts of at least 1, not"):
         action_grid(Pendulum(), [3, 3])
 
 
+def test_a_truth_is_a_mask_over_the_regions() -> None:
+    """Forbidden are the moves that cross any of its regions, and no others; a number is no mask."""
+    system = Pendulum()
+    regions = Regions.from_grid(system.space, (4, 4)).joined(
+        Regions.from_boxes(system.space, [Box([3.2, 0.1], [3.6, 0.9])], ["truth"])
+    )
+    model = discretize(system, Grid(system.space, (9, 9)), action_grid(system, 3), 0.5, regions)
+    crosses = model.crosses.toarray().reshape(81, 3, 17)
+    both = model.under(regions.mask(["truth", "5"]))
+    forbidden = crosses[..., 16] | crosses[..., 5]
+    assert 0 < forbidden.sum() < 100
+    np.testing.assert_array_equal(both.allowed, model.allowed & ~forbidden)
+    np.testing.assert_array_equal(model.under(np.zeros(17, bool)).allowed, model.allowed)
+    for wrong in ([16], 16, np.ones(16, bool), np.ones((1, 17), bool), np.ones(17)):
+        with pytest.raises(ValueError, match="mask over 17 regions needs as many truth values"):
+            model.under(wrong)
+
+
 def test_errors_print_the_shapes() -> None:
-    ones = np.ones((3, 2), dtype=bool)
-    good = {
-        "successor": np.zeros((3, 2), dtype=np.int64),
-        "reward": np.zeros((3, 2)),
-        "allowed": ones,
-        "crosses": sparse.csr_matrix((6, 1), dtype=bool),
-        "action": np.arange(2),
-    }
-    TabularMDP(**good)
-    with pytest.raises(ValueError, match=r"reward \(2, 2\)"):
-        TabularMDP(**{**good, "reward": np.zeros((2, 2))})
-    with pytest.raises(ValueError, match="leads to no cell is marked as allowed"):
-        TabularMDP(**{**good, "successor": np.full((3, 2), -1)})
+    good = toy_model(
+        np.zeros((3, 2), int), np.zeros((3, 2)), np.ones((3, 2), bool), np.eye(6, 4) > 0
+    )
+    assert good.action.tolist() == [0, 1]
+    for field, value in {
+        "reward": np.zeros((2, 2)),
+        "allowed": np.ones((3, 3), bool),
+        "crosses": sparse.csr_matrix((6, 3), dtype=bool),
+        "actions": np.zeros((4, 1)),
+        "grid": Grid(good.grid.space, (4,)),
+        "regions": Regions.from_grid(good.grid.space, (3,)),
+    }.items():
+        with pytest.raises(ValueError, match=r"3 cells|4 cells") as refusal:
+            replace(good, **{field: value})
+        assert "successor (3, 2)" in str(refusal.value)
+        assert "do not agree" in str(refusal.value)
+    for nowhere in (-1, 3):
+        with pytest.raises(ValueError, match="leads to no cell is marked as allowed"):
+            replace(good, successor=np.full((3, 2), nowhere))
+    with pytest.raises(ValueError, match="time step must be positive, not 0"):
+        replace(good, dt=0.0)

@@ -22,7 +22,7 @@ from experiments.config.settings.kinds import (
     Word,
     about,
 )
-from mlci.regions import ConstraintSet
+from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 
 NO_TRUTH = "none"  # the truth's name where nothing is forbidden
@@ -146,13 +146,13 @@ class HypothesesSettings:
         about("more hypotheses, null for a free dimension", "of the state"),
     ]
 
-    def regions(self, space: StateSpace) -> ConstraintSet:
+    def regions(self, space: StateSpace) -> Regions:
         """All hypotheses, in the order in which tables number them."""
         boxes = [region.box() for region in self.boxes]
         if self.shape is None:
-            return ConstraintSet.from_boxes(space, boxes)
-        cells = ConstraintSet.from_grid(space, self.shape)
-        return cells.joined(ConstraintSet.from_boxes(space, boxes)) if boxes else cells
+            return Regions.from_boxes(space, boxes)
+        cells = Regions.from_grid(space, self.shape)
+        return cells.joined(Regions.from_boxes(space, boxes))
 
 
 @dataclass(frozen=True, config=STRICT)

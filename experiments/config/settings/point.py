@@ -32,7 +32,7 @@ from experiments.config.settings.parts import (
 )
 from experiments.config.settings.system import SystemSettings, read_system
 from mlci.grids import Grid
-from mlci.regions import ConstraintSet
+from mlci.regions import Regions
 from mlci.systems import System
 
 
@@ -57,7 +57,7 @@ class SubjectSettings:
         return self.system.build()
 
     @cached_property
-    def candidates(self) -> ConstraintSet:
+    def candidates(self) -> Regions:
         """The hypotheses."""
         return self.hypotheses.regions(self.model.space)
 
@@ -104,12 +104,13 @@ class Settings(ModelSettings):
     seed: Annotated[Seed, about("of all that is random")]
 
     @cached_property
-    def constraint(self) -> ConstraintSet:
+    def constraint(self) -> Regions:
         """The true constraint; a set of no regions where there is none."""
         boxes = [region.box() for region in self.truth.boxes]
         if self.truth.cell is not None:
             boxes = [self.candidates.box(self.truth.cell)]
-        return ConstraintSet.from_boxes(self.model.space, boxes)
+        names = [f"truth_{number}" for number in range(len(boxes))]
+        return Regions.from_boxes(self.model.space, boxes, names)
 
     @property
     def columns(self) -> dict[str, str | int | float]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from experiments.point.beliefs import EDGES, Shown, calibration_table
 from hydra import compose, initialize_config_dir
 
 from experiments.app import version_base
@@ -15,7 +16,6 @@ from experiments.collate.reliability import reliability
 from experiments.config.paths import CONF
 from experiments.config.read import plain_tree, read_config
 from experiments.config.settings import Settings
-from experiments.point.beliefs import EDGES, Shown, calibration_table
 from experiments.point.run import run_point
 from experiments.point.stages import tabular_model
 from experiments.sweep.plugins import register_plugins

@@ -17,7 +17,7 @@ from experiments.point import stages
 from experiments.point.run import run_point
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.store import Store
-from mlci.tabular import TabularMDP, action_grid, discretize
+from mlci.tabular import TabularModel, action_grid, discretize
 
 register_plugins()
 
@@ -27,7 +27,7 @@ def composed(*overrides: str) -> Settings:
         return read_config(plain_tree(compose("config", ["grid.shape=[7,9]", *overrides])))[0]
 
 
-def assert_equal(one: TabularMDP, two: TabularMDP) -> None:
+def assert_equal(one: TabularModel, two: TabularModel) -> None:
     for name in ("successor", "reward", "allowed", "action"):
         assert getattr(one, name).dtype == getattr(two, name).dtype
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
@@ -63,7 +63,7 @@ def test_model_is_computed_once_for_all_that_it_does_not_depend_on(
 ) -> None:
     counted: list[int] = []
 
-    def counting(*arguments: object, **named: object) -> TabularMDP:
+    def counting(*arguments: object, **named: object) -> TabularModel:
         counted.append(len(arguments[4]))
         return discretize(*arguments, **named)
 

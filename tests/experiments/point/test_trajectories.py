@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from experiments.point.trajectories import probability_table, telling_trial, trajectory_tables
 from scipy import sparse
 
-from experiments.point.trajectories import probability_table, telling_trial, trajectory_tables
-from mlci.tabular import TabularMDP
+from mlci.tabular import TabularModel
 
 # Four cells in a row, actions back (0) and on (1). Hypothesis 0 is crossed on the way between
 # cells 1 and 2, hypothesis 1 between 2 and 3; region 2 is the truth, crossed as hypothesis 1.
@@ -13,12 +13,12 @@ CROSSED = {(1, 1): [0], (2, 0): [0], (2, 1): [1, 2], (3, 0): [1, 2]}
 
 
 @pytest.fixture
-def chain() -> TabularMDP:
+def chain() -> TabularModel:
     successor = np.array([[-1, 1], [0, 2], [1, 3], [2, -1]])
     crosses = np.zeros((8, 3), dtype=bool)
     for (cell, action), regions in CROSSED.items():
         crosses[2 * cell + action, regions] = True
-    return TabularMDP(
+    return TabularModel(
         successor,
         np.zeros((4, 2)),
         successor >= 0,
@@ -27,7 +27,7 @@ def chain() -> TabularMDP:
     )
 
 
-def test_visits_and_violations_are_those_of_the_moves(chain: TabularMDP) -> None:
+def test_visits_and_violations_are_those_of_the_moves(chain: TabularModel) -> None:
     trajectories = {
         3: (np.array([0, 1, 0]), np.array([1, 0])),  # turns before any region
         7: (np.array([1, 2, 3]), np.array([1, 1])),  # through everything
@@ -48,7 +48,7 @@ def test_visits_and_violations_are_those_of_the_moves(chain: TabularMDP) -> None
     assert tables["moves"].to_numpy().tolist() == [[0, 1, 1], [1, 0, 0], [1, 1, 2]]
 
 
-def test_nothing_feasible_leaves_tables_with_columns_alone(chain: TabularMDP) -> None:
+def test_nothing_feasible_leaves_tables_with_columns_alone(chain: TabularModel) -> None:
     tables = trajectory_tables(chain, {}, {4: np.array([True, False])}, shown=None)
     assert list(tables["sampled"].columns) == ["trial", "step", "cell"]
     assert len(tables["sampled"]) == len(tables["moves"]) == 0

@@ -8,14 +8,13 @@ import numpy as np
 import pandas as pd
 
 from mlci.spaces import Bools, Floats, Ints
-from mlci.tabular import TabularMDP
+from mlci.tabular import TabularModel
 
 
-def telling_trial(feasible: Bools, unconstrained: Floats, covered: Bools) -> int:
-    """The trial that shows best what a constraint does.
+def trial_that_shows_the_constraint(feasible: Bools, unconstrained: Floats, covered: Bools) -> int:
+    """The feasible trial that is most likely to violate the truth where nobody forbids it.
 
-    It is the feasible one that is most likely to violate the truth where nobody forbids it, and
-    the first of equals.
+    The first of equals; the first of all if none is feasible.
 
     Args:
         feasible: (N,) which trials the tabular agent can do under the truth.
@@ -26,35 +25,37 @@ def telling_trial(feasible: Bools, unconstrained: Floats, covered: Bools) -> int
 
 
 def trajectory_tables(
-    mdp: TabularMDP,
+    model: TabularModel,
+    hypotheses: Bools,
     trajectories: Mapping[int, tuple[Ints, Ints]],
     violated: Mapping[int, Bools],
-    shown: int | None,
+    example: int | None,
 ) -> dict[str, pd.DataFrame]:
     """Sampled trajectories, the hypotheses that they and the demonstrations violate, some moves.
 
     Args:
-        mdp: the tabular model; its first regions are the hypotheses.
+        model: the tabular model.
+        hypotheses: (C',) mask over the model's regions.
         trajectories: cells (T+1,) and moves (T,) of one sampled trajectory, by trial.
         violated: (C,) hypotheses that a demonstration violates, by trial.
-        shown: the trial whose trajectory is shown with its moves.
+        example: the trial whose moves are listed.
 
     Returns:
         `sampled`, a row a step of a trajectory; `violations`, a row a hypothesis that a
         demonstration or a trajectory violates; and `moves`, a row an action and successor of the
-        cells that the trajectory of `shown` visits.
+        cells that the trajectory of `example` visits.
     """
     visits, crossed = [], []
     for trial, (cells, moves) in trajectories.items():
         visits += [(trial, step, cell) for step, cell in enumerate(cells)]
-        regions = np.unique(mdp.crosses[cells[:-1] * mdp.moves + moves].indices)
-        crossed += [(trial, "sampled", i) for i in regions if i < len(violated[trial])]
+        crosses = model.crosses[cells[:-1] * model.moves + moves][:, hypotheses]
+        crossed += [(trial, "sampled", i) for i in np.unique(crosses.indices)]
     for trial, regions in violated.items():
         crossed += [(trial, "demonstration", i) for i in np.flatnonzero(regions)]
     steps = {
-        (int(cell), int(mdp.action[move]), int(mdp.successor[cell, move]))
-        for cell in (() if shown is None else trajectories[shown][0])
-        for move in np.flatnonzero(mdp.allowed[cell])
+        (int(cell), int(model.action[move]), int(model.successor[cell, move]))
+        for cell in (() if example is None else trajectories[example][0])
+        for move in np.flatnonzero(model.allowed[cell])
     }
     return {
         "sampled": pd.DataFrame(visits, columns=["trial", "step", "cell"]),

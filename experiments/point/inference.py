@@ -1,0 +1,79 @@
+"""First step of a point: demonstrations, the tabular model, and what they say of the hypotheses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.config.settings import Settings
+from experiments.point.stages import TrialSet, demonstrations, tabular_model
+from experiments.tracking.store import Store
+from mlci.demonstrations import Demonstration
+from mlci.diagnosis import Diagnosis, diagnose
+from mlci.inference import Inference, infer
+from mlci.spaces import Bools, Ints
+from mlci.tabular import TabularModel
+
+
+@dataclass(frozen=True, eq=False)
+class PointInference:
+    """What a point's demonstrations say of the hypotheses.
+
+    Attributes:
+        trials: all trials of the demonstrator.
+        numbers: (N,) those trials that are demonstrations.
+        demonstrations: (N,) the demonstrations.
+        model: the tabular model; its regions are the hypotheses and the truth's boxes.
+        hypotheses: (C',) mask over the model's regions.
+        truth: (C',) mask over the model's regions: the truth's boxes.
+        inference: from the N demonstrations about the C hypotheses.
+        diagnosis: how the model moves.
+    """
+
+    trials: TrialSet
+    numbers: Ints
+    demonstrations: tuple[Demonstration, ...]
+    model: TabularModel
+    hypotheses: Bools
+    truth: Bools
+    inference: Inference
+    diagnosis: Diagnosis
+
+    @property
+    def unreachable(self) -> int:
+        """How many goals the tabular model cannot reach."""
+        return int(np.sum(~self.inference.reachable))
+
+
+def infer_point(settings: Settings, store: Store) -> PointInference:
+    """Run the demonstrator and rank the hypotheses.
+
+    Raises:
+        RuntimeError: no trial is a demonstration.
+    """
+    trials = demonstrations(settings, store)
+    numbers = trials.kept(settings.demonstrations.keep)
+    if not len(numbers):
+        outcomes = ", ".join(f"{count} {outcome}" for outcome, count in trials.counts().items())
+        raise RuntimeError(
+            f"no demonstration was kept ({outcomes}): widen tasks, or allow more "
+            "demonstrations.iterations, restarts or goal_weight"
+        )
+    model = tabular_model(settings, store)
+    paths = tuple(
+        trials.demonstration(number, settings.horizon, settings.demonstrations.dt)
+        for number in numbers
+    )
+    hypotheses = model.regions.mask(settings.candidates.names)
+    inference = infer(model, paths, hypotheses=hypotheses, prior_none=settings.inference.prior)
+    return PointInference(
+        trials=trials,
+        numbers=numbers,
+        demonstrations=paths,
+        model=model,
+        hypotheses=hypotheses,
+        truth=model.regions.mask(settings.constraint.names),
+        inference=inference,
+        diagnosis=diagnose(model),
+    )

@@ -1,0 +1,100 @@
+"""Second step of a point: the paper's measures, under the truth (section V)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.config.settings import Settings
+from experiments.point.inference import PointInference
+from experiments.point.streams import Purpose, stream
+from mlci.demonstrations import Demonstration
+from mlci.maxent import TrajectoryDistribution
+from mlci.metrics import final_state_error, violation_distance
+from mlci.simulate import rollout
+from mlci.spaces import Bools, Floats, Ints
+from mlci.systems import System
+
+
+@dataclass(frozen=True, eq=False)
+class Measures:
+    """What the tabular agent does under the truth, for each of N demonstrations.
+
+    Attributes:
+        feasible: (N,) whether it can do the task; NaN stands in the others' measures.
+        phi: (N, C) probability that it violates a hypothesis; 0 where not feasible.
+        final_state_error: (N,) mean over sampled trajectories, the measure of Fig. 3.
+        violation_distance: (N,) equation (11) for each demonstration alone.
+        violation_floor: (N,) what that is on average for the model's own trajectories.
+        violation_share: (N,) what each demonstration adds to the pooled distance.
+        trajectories: cells (T+1,) and moves (T,) of one sampled trajectory, by trial.
+    """
+
+    feasible: Bools
+    phi: Floats
+    final_state_error: Floats
+    violation_distance: Floats
+    violation_floor: Floats
+    violation_share: Floats
+    trajectories: Mapping[int, tuple[Ints, Ints]]
+
+
+def measure_point(settings: Settings, point: PointInference) -> Measures:
+    """Let the tabular agent do the tasks under the truth, and measure it."""
+    model, inference = point.model.under(point.truth), point.inference
+    count = len(point.demonstrations)
+    feasible, phi = np.zeros(count, dtype=bool), np.zeros(inference.phi.shape)
+    trajectories, controls = {}, []
+    for j, (number, demonstration) in enumerate(
+        zip(point.numbers.tolist(), point.demonstrations, strict=True)
+    ):
+        distribution = TrajectoryDistribution.of_task(model, demonstration.task)
+        feasible[j] = distribution.is_possible
+        if not feasible[j]:
+            continue
+        phi[j] = distribution.violation_probabilities()[point.hypotheses]
+        cells, moves = distribution.sample(
+            settings.rollouts, stream(settings.seed, Purpose.ROLLOUTS, number)
+        )
+        trajectories[number] = cells[0], moves[0]
+        controls.append(model.actions[model.action[moves]])
+    error, distance, floor, share = np.full((4, count), np.nan)
+    if feasible.any():
+        able = [point.demonstrations[j] for j in np.flatnonzero(feasible)]
+        error[feasible] = rollout_errors(
+            model.system, able, np.stack(controls), model.dt, settings.demonstrations.dt
+        )
+        violations = violation_distance(phi[feasible], inference.violated[feasible])
+        distance[feasible], floor[feasible] = violations.each, violations.floor
+        share[feasible] = violations.shares
+    return Measures(feasible, phi, error, distance, floor, share, trajectories)
+
+
+def rollout_errors(
+    system: System,
+    demonstrations: Sequence[Demonstration],
+    controls: Floats,
+    dt: float,
+    substep: float,
+) -> Floats:
+    """(N,) mean final-state error of sampled controls on the continuous system (Fig. 3).
+
+    Args:
+        system: the continuous system.
+        demonstrations: N demonstrations, from whose starts the controls are applied.
+        controls: (N, B, T, m) B samples for each.
+        dt: time for which a control is held [s].
+        substep: the longest step of the integrator [s].
+    """
+    substeps = int(np.ceil(dt / substep - 1e-9))
+    starts = np.array([demonstration.task.start for demonstration in demonstrations])
+    # All at once: a step of the integrator costs the same for many.
+    final = rollout(system, starts[:, None], controls, dt, substeps)[..., -1, :]
+    return np.array(
+        [
+            np.mean(final_state_error(system.space, ends, demonstration.task.goal))
+            for ends, demonstration in zip(final, demonstrations, strict=True)
+        ]
+    )

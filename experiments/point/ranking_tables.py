@@ -1,0 +1,72 @@
+"""Tables of ranked hypotheses, and of the truth's rank over random subsets of demonstrations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from experiments.config.settings import Settings
+from experiments.point.truth_tables import box_table
+from mlci.evidence import confidence
+from mlci.inference import Inference
+from mlci.metrics import random_subsets, top_chances, truth_ranks
+
+BEST = (1, 2)  # so many of the best hypotheses are compared with the truth, as in Fig. 7
+
+
+def rank_table(settings: Settings, inference: Inference, rng: np.random.Generator) -> pd.DataFrame:
+    """A row a random subset of the demonstrations: where the truth is in the ranking after them.
+
+    Beside the rank of the truth, if there is one, its columns are shares: whether that rank is
+    among the first, and whether the best hypothesis, or both of the best two, overlap the truth
+    or lie inside it.
+    """
+    hypotheses, constraint = inference.hypotheses, settings.constraint
+    truth = hypotheses.inside(constraint)
+    good = {"overlap": hypotheses.overlaps(constraint), "inside": truth}
+    compared = [top for top in BEST if top <= len(hypotheses)] if len(constraint) else []
+    ranks, evidence = settings.ranks, (inference.phi, inference.violated)
+    rows = []
+    for subsets in random_subsets(len(inference.names), ranks.demonstrations, ranks.subsets, rng):
+        rank = truth_ranks(*evidence, truth, subsets)
+        in_top = (rank <= ranks.top).astype(int) if truth.any() else np.nan
+        rows.append(
+            pd.DataFrame(
+                {
+                    "demonstrations": subsets.shape[1],
+                    "subset": np.arange(len(subsets)),
+                    "reachable": np.sum(inference.reachable[subsets], axis=1),
+                    "rank": rank,
+                    f"share_top_{ranks.top}": in_top,
+                    **{
+                        f"top_{top}_{name}": top_chances(*evidence, which, subsets, top)
+                        if top in compared
+                        else np.nan
+                        for name, which in good.items()
+                        for top in BEST
+                    },
+                }
+            )
+        )
+    return pd.concat(rows, ignore_index=True)
+
+
+def ranking_table(inference: Inference) -> pd.DataFrame:
+    """A row a hypothesis: its box, gain, rank and probabilities."""
+    ranking, hypotheses = inference.ranking, inference.hypotheses
+    prior = (1 - inference.prior_none) / len(hypotheses)
+    phi = inference.phi[inference.reachable]
+    certainty = [
+        confidence(prior, phi[:, i]) if ranking.feasible[i] else 0.0 for i in range(len(hypotheses))
+    ]
+    return pd.DataFrame(
+        {
+            **box_table("hypothesis", hypotheses),
+            "feasible": ranking.feasible,
+            "violating_demonstrations": np.sum(inference.violated, axis=0),
+            "gain": ranking.gain,
+            "rank": ranking.rank,
+            "posterior": ranking.posterior,
+            "confidence_alone": certainty,
+        }
+    )
