@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from mlci.online import prepare
 
 from experiments.config.settings import Settings
+from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.grids import Grid
-from mlci.inference import rank_constraints
-from mlci.maxent import expected_violations, log_partition, violation_probabilities
+from mlci.inference import infer, prepare
+from mlci.maxent import TrajectoryDistribution
 from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
-from mlci.simulate import rk4_step, step_count
-from mlci.spaces import Box, Floats, Ints
-from mlci.systems import Pendulum, System
+from mlci.simulate import rk4_step
+from mlci.spaces import Box
+from mlci.systems import Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize, substep_count
 from tests.benchmark.timing import Row, copy_rate, median_seconds
 
@@ -29,32 +28,33 @@ HYPOTHESES = Regions.from_grid(SYSTEM.space, (10, 10))
 TRUTH = Regions(SYSTEM.space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])  # type: ignore[arg-type]
 
 
-def phi_floor(mdp: TabularModel, log_z: Floats) -> float:
+def phi_floor(distribution: TrajectoryDistribution) -> float:
     """Seconds to read the row of Phi of each successor and to write each cell's, once a step."""
-    traffic = 0
-    ways = mdp.ways
-    cell = np.repeat(np.arange(mdp.states), np.diff(ways.begins))
-    pairs = np.unique(np.stack([cell, ways.successor]), axis=1)
-    successors = np.bincount(pairs[0], minlength=mdp.states)
-    for t in range(len(log_z) - 1):
+    traffic, model, log_z = 0, distribution.model, distribution.log_z
+    cell = np.repeat(np.arange(model.states), np.diff(model.merged.begins))
+    pairs = np.unique(np.stack([cell, model.merged.successor]), axis=1)
+    successors = np.bincount(pairs[0], minlength=model.states)
+    for t in range(distribution.steps):
         cells = np.flatnonzero(log_z[t] > -np.inf)
         traffic += int(np.sum(successors[cells])) + len(cells)
-    return traffic * mdp.crosses.shape[1] * 8 / copy_rate(1 << 19)
+    return traffic * len(model.regions) * 8 / copy_rate(1 << 19)
 
 
-def exp_floor(mdp: TabularModel, log_z: Floats) -> float:
-    """Seconds to take the exponential of each way of each cell that carries probability."""
-    entries = int(np.sum((log_z > -np.inf) @ np.diff(mdp.ways.begins)))
+def exp_floor(distribution: TrajectoryDistribution) -> float:
+    """Seconds to take the exponential of each merged move of each cell that has probability."""
+    begins = distribution.model.merged.begins
+    entries = int(np.sum((distribution.log_z > -np.inf) @ np.diff(begins)))
     return median_seconds(lambda: np.exp(np.full(entries, -1.0)))
 
 
-def step_floor(system: System, grid: Grid, actions: Floats, dt: float, mdp: TabularModel) -> float:
+def step_floor(model: TabularModel) -> float:
     """Seconds of the Runge-Kutta steps of all moves, from the rate of a block of them."""
-    cells = max(1, min(grid.size, _BLOCK // mdp.moves))
-    points = np.repeat(grid.centers[:cells], mdp.moves, axis=0)
-    held = actions[np.tile(mdp.action, cells)]
-    one = median_seconds(lambda: rk4_step(system, points, held, dt), 25) * grid.size / cells
-    return substep_count(system, grid, actions, dt) * one
+    system, grid, actions = model.system, model.grid, model.actions
+    cells = max(1, min(grid.size, _BLOCK // model.moves))
+    points = np.repeat(grid.centers[:cells], model.moves, axis=0)
+    held = actions[np.tile(model.action, cells)]
+    one = median_seconds(lambda: rk4_step(system, points, held, model.dt), 25) * grid.size / cells
+    return substep_count(system, grid, actions, model.dt) * one
 
 
 def pendulum_rows(cells: int, dt: float, samples: int) -> list[Row]:
@@ -62,30 +62,30 @@ def pendulum_rows(cells: int, dt: float, samples: int) -> list[Row]:
     grid, actions = Grid(SYSTEM.space, (cells, cells)), action_grid(SYSTEM, 9)
     what = f"pendulum, {grid.size} cells x 9 actions, dt {dt:g} s, {samples} sample(s)"
     label = f"{grid.size}" + (f"_samples{samples}" if samples > 1 else "")
-    mdp = discretize(SYSTEM, grid, actions, dt, HYPOTHESES, samples)
-    steps = round(5 / dt)
-    start, goal = int(grid.index([0.5, 0.0])), grid.cells_in(Box.point([3.0, 0.0]))
-    log_z = log_partition(mdp, start, goal, steps)
-    violation_probabilities(mdp, log_z, start)  # fills the caches that all tasks share
+    model = discretize(SYSTEM, grid, actions, dt, HYPOTHESES, samples)
+    distribution = TrajectoryDistribution.of_task(
+        model, Task([0.5, 0.0], Box.point([3.0, 0.0]), 5.0)
+    )
+    distribution.violation_probabilities()  # fills the caches that all tasks share
     return [
         Row(
             f"discretize_{label}",
             median_seconds(lambda: discretize(SYSTEM, grid, actions, dt, HYPOTHESES, samples), 3),
-            step_floor(SYSTEM, grid, actions, dt, mdp),
+            step_floor(model),
             3,
             f"discretize: {what}; floor: its Runge-Kutta steps",
         ),
         Row(
             f"log_partition_{label}",
-            median_seconds(lambda: log_partition(mdp, start, goal, steps)),
-            exp_floor(mdp, log_z),
+            median_seconds(lambda: replace(distribution).log_z),
+            exp_floor(distribution),
             7,
-            f"log_partition: {what}; floor: one exponential for each active way",
+            f"soft Bellman backup: {what}; floor: one exponential for each active merged move",
         ),
         Row(
             f"violation_probabilities_{label}",
-            median_seconds(lambda: violation_probabilities(mdp, log_z, start)),
-            phi_floor(mdp, log_z),
+            median_seconds(distribution.violation_probabilities),
+            phi_floor(distribution),
             7,
             f"violation_probabilities: {what}; floor: traffic of Phi",
         ),
@@ -96,42 +96,37 @@ def telescope_rows(settings: Settings, samples: int) -> list[Row]:
     """The telescoping pendulum at the paper's size: five demonstrations, from nothing to ranks."""
     system, grid, dt = settings.model, settings.cells, settings.dt
     actions, hypotheses = action_grid(system, settings.action_counts), settings.candidates
-    paths, starts, goals = telescope_tasks(settings)
-    steps = [step_count(settings.horizon, dt)] * len(paths)
-    mdp = discretize(system, grid, actions, dt, hypotheses, samples)
-    log_z = [log_partition(mdp, *task) for task in zip(starts, goals, steps, strict=True)]
+    demonstrations = telescope_demonstrations(settings)
+    model = discretize(system, grid, actions, dt, hypotheses, samples)
+    tasks = [each.task for each in demonstrations]
+    distributions = [TrajectoryDistribution.of_task(model, task) for task in tasks]
     what = (
         f"telescoping pendulum, {grid.size} cells x {len(actions)} actions, {len(hypotheses)} "
-        f"hypotheses, {steps[0]} steps, {samples} sample(s)"
+        f"hypotheses, {distributions[0].steps} steps, {samples} sample(s)"
     )
     label = "telescope" + (f"_samples{samples}" if samples > 1 else "")
-
-    def infer() -> None:
-        fresh = replace(mdp)  # without what earlier tasks have prepared
-        phi, _ = expected_violations(fresh, starts, goals, steps)
-        rank_constraints(phi, [hypotheses.violated_by(path) for path in paths])
-
-    prepared = prepare(mdp, hypotheses, starts, goals, steps)
+    prepared, paths = prepare(model, tasks), [each.states for each in demonstrations]
     recorded = sum(len(path) for path in paths)
     return [
         Row(
             f"{label}_discretize",
             median_seconds(lambda: discretize(system, grid, actions, dt, hypotheses, samples), 5),
-            step_floor(system, grid, actions, dt, mdp),
+            step_floor(model),
             5,
             f"discretize: {what}; floor: its Runge-Kutta steps",
         ),
         Row(
             f"{label}_infer_5",
-            median_seconds(infer),
-            sum(phi_floor(mdp, each) + exp_floor(mdp, each) for each in log_z),
+            # A copy is without what earlier tasks have prepared.
+            median_seconds(lambda: infer(replace(model), demonstrations).ranking),
+            sum(phi_floor(each) + exp_floor(each) for each in distributions),
             7,
             f"5 demonstrations to ranks, the model given: {what}; floor: exponentials and traffic",
             "about 5 minutes on a single CPU core",
         ),
         Row(
             f"{label}_rank_prepared_5",
-            median_seconds(lambda: prepared.rank(paths), 101),
+            median_seconds(lambda: prepared.infer(paths).ranking, 101),
             float("nan"),
             101,
             f"5 demonstrations ({recorded} samples) to ranks, tasks known in advance: {what}",
@@ -139,7 +134,7 @@ def telescope_rows(settings: Settings, samples: int) -> list[Row]:
         ),
         Row(
             f"{label}_rank_prepared_1",
-            median_seconds(lambda: prepared.rank(paths[:1], [0]), 101),
+            median_seconds(lambda: prepared.infer(paths[:1], [0]).ranking, 101),
             float("nan"),
             101,
             f"the same for one demonstration: {what}",
@@ -148,8 +143,8 @@ def telescope_rows(settings: Settings, samples: int) -> list[Row]:
     ]
 
 
-def telescope_tasks(settings: Settings) -> tuple[list[Floats], list[int], Sequence[Ints]]:
-    """Five unconstrained demonstrations within the bounds, and their tasks as cells."""
+def telescope_demonstrations(settings: Settings) -> list[Demonstration]:
+    """Five unconstrained demonstrations within the bounds."""
     system, box, bounds = settings.model, settings.tasks.box(), settings.model.space.bounds
     trials = sample_trials(
         system,
@@ -162,21 +157,15 @@ def telescope_tasks(settings: Settings) -> tuple[list[Floats], list[int], Sequen
         goal_offsets=settings.tasks.goal_offsets,
         restarts=1,
     )
-    shown = demonstrate(system, trials, None, None, dt=settings.demonstrations.dt)
+    attempts = demonstrate(system, trials, None, None, dt=settings.demonstrations.dt)
     limits = system.control_box
-    kept = [
+    return [
         attempt.demonstration
-        for attempt in shown
+        for attempt in attempts
         if attempt.demonstration.controls is not None
         and np.all(limits.contains(attempt.demonstration.controls))
         and np.all(system.space.contains(attempt.demonstration.states))
     ][:5]
-    starts = [int(settings.cells.index(each.task.start)) for each in kept]
-    return (
-        [each.states for each in kept],
-        starts,
-        [settings.cells.cells_in(each.task.goal) for each in kept],
-    )
 
 
 def demonstrator_rows() -> list[Row]:

@@ -19,9 +19,9 @@ import numpy as np
 from tqdm import tqdm
 
 from experiments.tracking.environment import peak_memory
+from mlci.evidence import rank_constraints
 from mlci.grids import Grid
-from mlci.inference import rank_constraints
-from mlci.maxent import log_partition, violation_probabilities
+from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
 from mlci.simulate import step_count
 from mlci.spaces import Box, Floats, StateSpace
@@ -82,14 +82,14 @@ def measure(name: str, shape: tuple[int, ...]) -> dict[str, object]:
     steps, clock = step_count(HORIZON, DT), [time.process_time()]
 
     with tqdm(total=grid.size, unit="cell", leave=False, disable=None) as bar:
-        mdp = discretize(
+        model = discretize(
             system, grid, actions, DT, hypotheses, progress=lambda done, _: bar.update(done - bar.n)
         )
     clock.append(time.process_time())
-    cell = int(grid.index(start))
-    log_z = log_partition(mdp, cell, grid.cells_in(goal), steps)
+    distribution = TrajectoryDistribution(model, int(grid.index(start)), grid.cells_in(goal), steps)
+    log_z = distribution.log_z
     clock.append(time.process_time())
-    phi = violation_probabilities(mdp, log_z, cell)
+    phi = distribution.violation_probabilities()
     clock.append(time.process_time())
     rank_constraints(phi[None], np.zeros((1, len(phi)), dtype=bool))
     clock.append(time.process_time())
@@ -103,11 +103,11 @@ def measure(name: str, shape: tuple[int, ...]) -> dict[str, object]:
         "hypotheses": len(hypotheses),
         "steps": steps,
         "dt": DT,
-        "moves_allowed": round(float(np.mean(mdp.allowed)), 4),
+        "moves_allowed": round(float(np.mean(model.allowed)), 4),
         "largest_active_share": round(float(np.max(active)) / grid.size, 4),
         "cells_active": int(np.sum(active)),
         "discretise_s": round(float(seconds[0]), 4),
-        "discretise_floor_s": round(step_floor(system, grid, actions, DT, mdp), 4),
+        "discretise_floor_s": round(step_floor(model), 4),
         "partition_s": round(float(seconds[1]), 4),
         "violation_s": round(float(seconds[2]), 4),
         "rank_s": round(float(seconds[3]), 6),

@@ -19,8 +19,8 @@ from experiments.config.paths import CONF
 from experiments.config.read import ConfigError, plain_tree, read_advice_config
 from experiments.config.settings import AdviceSettings
 from experiments.sweep.plugins import register_plugins
+from mlci.diagnosis import MOST_FROZEN, MOST_UNREACHABLE, Diagnosis
 from mlci.grids import Grid
-from mlci.metrics import MOST_FROZEN, MOST_UNREACHABLE, Diagnosis
 from mlci.systems import Pendulum
 
 register_plugins()

@@ -17,7 +17,7 @@ from experiments.config.paths import CHECKOUT
 from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
-from mlci.reachability import solve
+from mlci.reachability import solve_safe_set
 from mlci.recordings.read import write_demonstration
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
@@ -44,7 +44,7 @@ def shown() -> list[Demonstration]:
     """Demonstrations of the pendulum under a truth, from the project's own demonstrator."""
     system = Pendulum()
     grid = Grid(system.space, (61, 61))
-    omega = solve(system, grid, TRUTH)
+    omega = solve_safe_set(system, grid, TRUTH)
     margin = border_margin(system, omega, 0.02)
     box = Box(np.array([0.0, -2.0]), np.array([2 * np.pi, 2.0]))
     trials = sample_trials(

@@ -12,7 +12,7 @@ import pytest
 from experiments.config import memory
 from experiments.config.memory import expected_memory, machine_memory
 from experiments.config.settings import GridSettings, Settings
-from mlci.maxent import log_partition, violation_probabilities
+from mlci.maxent import TrajectoryDistribution
 from mlci.spaces import Box
 from mlci.tabular import action_grid, discretize
 
@@ -29,11 +29,10 @@ def test_a_model_takes_no_more_than_expected_and_not_much_less(
     monkeypatch.setattr(memory, "_BYTES_AT_REST", 0)
     tracemalloc.start()
     actions = action_grid(large.model, large.action_counts)
-    mdp = discretize(large.model, large.cells, actions, large.dt, large.candidates)
+    model = discretize(large.model, large.cells, actions, large.dt, large.candidates)
     start = int(large.cells.index([-1.0, 0.5]))
     goal = large.cells.cells_in(Box(np.array([-0.5, -np.inf]), np.array([0.5, np.inf])))
-    log_z = log_partition(mdp, start, goal, 20)
-    phi = violation_probabilities(mdp, log_z, start)
+    phi = TrajectoryDistribution(model, start, goal, 20).violation_probabilities()
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert np.max(phi) > 0.5

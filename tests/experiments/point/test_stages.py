@@ -48,7 +48,7 @@ def test_stored_model_is_the_computed_one(overrides: list[str], tmp_path: Path) 
     direct = discretize(
         settings.model,
         settings.cells,
-        action_grid(settings.model, list(settings.action_counts)),
+        action_grid(settings.model, settings.action_counts),
         settings.dt,
         settings.candidates.joined(settings.constraint),
         settings.transition.samples,

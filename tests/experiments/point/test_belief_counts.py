@@ -8,33 +8,41 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from experiments.point.beliefs import EDGES, Shown, calibration_table
-from hydra import compose, initialize_config_dir
+from tiny_point import composed
 
-from experiments.app import version_base
 from experiments.collate.reliability import reliability
-from experiments.config.paths import CONF
-from experiments.config.read import plain_tree, read_config
+from experiments.config.read import read_config
 from experiments.config.settings import Settings
+from experiments.point.belief_counts import EDGES, belief_counts
+from experiments.point.inference import PointInference
 from experiments.point.run import run_point
 from experiments.point.stages import tabular_model
-from experiments.sweep.plugins import register_plugins
 from experiments.tracking.store import Store
+from mlci.inference import Inference
 
 WORLDS, SETS = 5, 40
-NOTHING = Shown(np.zeros((0, WORLDS)), np.zeros((0, WORLDS), bool), np.zeros(0, bool))
 BEYOND = len(EDGES)
 
 
-def composed(*words: str) -> Settings:
+def tiny(*words: str) -> Settings:
     """A double integrator with five hypotheses, on a few cells."""
-    register_plugins()
-    tiny = ["system=double_integrator", "hypotheses.shape=[5,null]", "grid.shape=[10,6]"]
-    tiny += ["horizon=2.0", "dt=0.5", "actions=3", "calibration.demonstrations=[1,3]"]
-    with initialize_config_dir(str(CONF), **version_base()):
-        return read_config(
-            plain_tree(compose("config", [*tiny, f"calibration.sets={SETS}", *words]))
-        )[0]
+    few = ["system=double_integrator", "hypotheses.shape=[5,null]", "grid.shape=[10,6]"]
+    few += ["horizon=2.0", "dt=0.5", "actions=3", "calibration.demonstrations=[1,3]"]
+    return read_config(composed(*few, f"calibration.sets={SETS}", *words))[0]
+
+
+def counts(settings: Settings, store: Store, inference: Inference | None = None) -> pd.DataFrame:
+    """The beliefs of a world from some demonstrations of its own, by default none."""
+    model = tabular_model(settings, store)
+    hypotheses = model.regions.mask(settings.candidates.names)
+    shape = 0, len(settings.candidates)
+    if inference is None:
+        evidence = np.zeros(shape), np.zeros(shape, bool), np.zeros(0, bool)
+        inference = Inference(settings.candidates, (), *evidence, settings.inference.prior)
+    truth = model.regions.mask(settings.constraint.names)
+    nothing = np.empty(0, dtype=int)
+    point = PointInference(None, nothing, (), model, hypotheses, truth, inference, None)
+    return belief_counts(settings, point)
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +50,8 @@ def worlds(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """The table of every world, drawn from the tabular model."""
     store, tables = Store(tmp_path_factory.mktemp("store")), []
     for words in (["truth=none"], *(["truth=cell", f"truth.cell={i}"] for i in range(WORLDS))):
-        settings = composed(*words)
-        table = calibration_table(settings, tabular_model(settings, store), WORLDS, NOTHING)
+        settings = tiny(*words)
+        table = counts(settings, store)
         tables.append(table.assign(truth=settings.columns["truth"], seed=0))
     both = pd.concat(tables, ignore_index=True)
     return both[["truth", "seed", *(name for name in both if name not in ("truth", "seed"))]]
@@ -83,16 +91,17 @@ def test_sets_that_a_truth_cannot_show_are_left_out_and_not_drawn_anew(
     assert worlds.groupby("truth")["prior"].first().sum() == pytest.approx(1)
 
 
-def test_beliefs_of_shown_demonstrations_by_hand(tmp_path: Path) -> None:
-    settings = composed("truth=cell", "truth.cell=1")
+def test_beliefs_of_demonstrations_by_hand(tmp_path: Path) -> None:
+    settings = tiny("truth=cell", "truth.cell=1")
     settings = dataclasses.replace(
         settings, calibration=dataclasses.replace(settings.calibration, sets=0)
     )
     phi = np.array([[0.2, 0.5, 0.0, 0.0, 0.9], [0.0, 0.0, 0.0, 0.0, 0.0], [0.2, 0.8, 0.1, 0, 0]])
     violated = np.array([[0, 0, 1, 0, 0], [1, 0, 0, 0, 0], [0, 0, 0, 0, 1]], dtype=bool)
     reachable = np.array([True, False, True])
-    shown = Shown(*(np.concatenate([part, part[::-1]]) for part in (phi, violated, reachable)))
-    table = calibration_table(settings, tabular_model(settings, Store(tmp_path)), 5, shown)
+    evidence = (np.concatenate([part, part[::-1]]) for part in (phi, violated, reachable))
+    inference = Inference(settings.candidates, tuple("abcdef"), *evidence)
+    table = counts(settings, Store(tmp_path), inference)
     assert table["source"].unique().tolist() == ["demonstrator"]
     assert (table[["prior", "sets"]] == [0.1, 2]).all(axis=None)
 
@@ -179,7 +188,7 @@ def test_intervals_cover_what_other_worlds_give() -> None:
 def test_point_writes_the_table_when_asked(tmp_path: Path) -> None:
     words = ["scale=smoke", "safety.shape=[41,21]", "truth=cell", "truth.cell=3"]
     few = "calibration.demonstrations=[1,2]"
-    settings = composed(*words, few, "demonstrations.dt=0.05", "horizon=2.0")
+    settings = tiny(*words, few, "demonstrations.dt=0.05", "horizon=2.0")
     tables = run_point(settings, Store(tmp_path), lambda line: None)
     table, kept = tables["calibration"], len(tables["trials"])
     own = table[table["source"] == "demonstrator"]
@@ -190,9 +199,9 @@ def test_point_writes_the_table_when_asked(tmp_path: Path) -> None:
     assert "calibration" not in run_point(settings, Store(tmp_path), lambda line: None)
 
 
-def test_model_that_solves_no_task_is_told(tmp_path: Path) -> None:
-    settings = composed("truth=none", "calibration.sets=1")
-    mdp = tabular_model(settings, Store(tmp_path))
-    still = dataclasses.replace(mdp, allowed=np.zeros_like(mdp.allowed))
+def test_model_that_solves_no_task_is_refused(tmp_path: Path) -> None:
+    """In 0.5 s the mass gets from no cell to any other, and no task that is drawn stays in one."""
+    stuck = ["horizon=0.5", "actions=1", "grid.shape=[3000,1]"]
+    settings = tiny("truth=none", "calibration.sets=1", *stuck)
     with pytest.raises(RuntimeError, match="none of 1000 tasks can be solved by the tabular agent"):
-        calibration_table(settings, still, WORLDS, NOTHING)
+        counts(settings, Store(tmp_path))

@@ -16,10 +16,11 @@ from experiments.config.settings import (
     Settings,
     TruthSettings,
 )
+from experiments.point.ranking_tables import rank_table
 from experiments.point.run import run_point
-from experiments.point.tables import rank_table
 from experiments.tracking.store import Store
-from mlci.inference import rank_constraints
+from mlci.evidence import rank_constraints
+from mlci.inference import Inference
 from mlci.metrics import random_subsets
 
 SHARES = [f"top_{top}_{name}" for top in (1, 2) for name in ("overlap", "inside")]
@@ -35,13 +36,18 @@ def walled(settings: Settings, low: float, high: float, keep: int = 8) -> Settin
     return dataclasses.replace(settings, truth=truth, demonstrations=more, ranks=ranks)
 
 
+def inference(settings: Settings, phi: np.ndarray, violated: np.ndarray) -> Inference:
+    names = tuple(map(str, range(len(phi))))
+    return Inference(settings.candidates, names, phi, violated, np.ones(len(phi), bool))
+
+
 def test_shares_are_of_rankings_whose_best_meet_the_truth(settings: Settings) -> None:
     settings = walled(settings, -0.3, 1.5)  # half of hypotheses 4 and 7, and all between
     which = {"overlap": {4, 5, 6, 7}, "inside": {5, 6}}
     rng = np.random.default_rng(4)
     phi = rng.random((9, 10)) * np.where(np.isin(np.arange(10), [5, 6]), 0.95, 0.8)
     violated = rng.random((9, 10)) < 0.05
-    table = rank_table(settings, phi, violated, np.ones(9, bool), np.random.default_rng(1))
+    table = rank_table(settings, inference(settings, phi, violated), np.random.default_rng(1))
     subsets = random_subsets(9, 4, 12, np.random.default_rng(1))
     best = [
         rank_constraints(phi[subset], violated[subset]).order[:2].tolist()
@@ -60,13 +66,12 @@ def test_shares_are_of_rankings_whose_best_meet_the_truth(settings: Settings) ->
 def test_no_truth_and_too_few_hypotheses_have_no_shares(settings: Settings) -> None:
     free = dataclasses.replace(settings, truth=TruthSettings("none", (), None))
     phi, violated = np.full((3, 10), 0.5), np.zeros((3, 10), dtype=bool)
-    rows = rank_table(free, phi, violated, np.ones(3, bool), np.random.default_rng(0))
+    rows = rank_table(free, inference(free, phi, violated), np.random.default_rng(0))
     assert rows[SHARES].isna().all(axis=None)
     alone = HypothesesSettings(None, (Region((0.6, None), (1.2, None)),))
     alone = dataclasses.replace(settings, hypotheses=alone)
-    rows = rank_table(
-        alone, phi[:, :1], violated[:, :1], np.ones(3, bool), np.random.default_rng(0)
-    )
+    of_one = inference(alone, phi[:, :1], violated[:, :1])
+    rows = rank_table(alone, of_one, np.random.default_rng(0))
     assert (rows[SHARES[:2]] == 1).all(axis=None)
     assert rows[SHARES[2:]].isna().all(axis=None)
 

@@ -2,14 +2,19 @@
 
 import numpy as np
 import pytest
-from experiments.point.trajectories import probability_table, telling_trial, trajectory_tables
-from scipy import sparse
+from toy_models import toy_model
 
+from experiments.point.trajectory_tables import (
+    probability_table,
+    trajectory_tables,
+    trial_that_shows_the_constraint,
+)
 from mlci.tabular import TabularModel
 
 # Four cells in a row, actions back (0) and on (1). Hypothesis 0 is crossed on the way between
-# cells 1 and 2, hypothesis 1 between 2 and 3; region 2 is the truth, crossed as hypothesis 1.
-CROSSED = {(1, 1): [0], (2, 0): [0], (2, 1): [1, 2], (3, 0): [1, 2]}
+# cells 1 and 2, hypothesis 1 between 2 and 3; region 0 is the truth, crossed as hypothesis 1.
+CROSSED = {(1, 1): [1], (2, 0): [1], (2, 1): [0, 2], (3, 0): [0, 2]}
+HYPOTHESES = np.array([False, True, True])
 
 
 @pytest.fixture
@@ -18,13 +23,7 @@ def chain() -> TabularModel:
     crosses = np.zeros((8, 3), dtype=bool)
     for (cell, action), regions in CROSSED.items():
         crosses[2 * cell + action, regions] = True
-    return TabularModel(
-        successor,
-        np.zeros((4, 2)),
-        successor >= 0,
-        sparse.csr_matrix(crosses),
-        np.array([0, 1]),
-    )
+    return toy_model(successor, np.zeros((4, 2)), successor >= 0, crosses)
 
 
 def test_visits_and_violations_are_those_of_the_moves(chain: TabularModel) -> None:
@@ -33,7 +32,7 @@ def test_visits_and_violations_are_those_of_the_moves(chain: TabularModel) -> No
         7: (np.array([1, 2, 3]), np.array([1, 1])),  # through everything
     }
     violated = {3: np.array([False, False]), 5: np.array([False, True]), 7: np.array([True, False])}
-    tables = trajectory_tables(chain, trajectories, violated, shown=3)
+    tables = trajectory_tables(chain, HYPOTHESES, trajectories, violated, example=3)
     assert tables["sampled"].to_numpy().tolist() == [
         *([3, 0, 0], [3, 1, 1], [3, 2, 0]),
         *([7, 0, 1], [7, 1, 2], [7, 2, 3]),
@@ -42,14 +41,14 @@ def test_visits_and_violations_are_those_of_the_moves(chain: TabularModel) -> No
         [5, "demonstration", 1],
         [7, "demonstration", 0],
         [7, "sampled", 0],
-        [7, "sampled", 1],  # the truth, region 2, is no hypothesis
+        [7, "sampled", 1],  # the truth, region 0, is no hypothesis
     ]
     # All moves from cells 0 and 1, none twice although cell 0 is visited twice.
     assert tables["moves"].to_numpy().tolist() == [[0, 1, 1], [1, 0, 0], [1, 1, 2]]
 
 
 def test_nothing_feasible_leaves_tables_with_columns_alone(chain: TabularModel) -> None:
-    tables = trajectory_tables(chain, {}, {4: np.array([True, False])}, shown=None)
+    tables = trajectory_tables(chain, HYPOTHESES, {}, {4: np.array([True, False])}, None)
     assert list(tables["sampled"].columns) == ["trial", "step", "cell"]
     assert len(tables["sampled"]) == len(tables["moves"]) == 0
     assert tables["violations"].to_numpy().tolist() == [[4, "demonstration", 0]]
@@ -64,8 +63,8 @@ def test_nothing_feasible_leaves_tables_with_columns_alone(chain: TabularModel) 
 def test_telling_trial_would_violate_the_truth_most() -> None:
     phi = np.array([[0.9, 0.1], [0.0, 0.3], [0.2, 0.7], [0.1, 0.3]])
     second = np.array([False, True])
-    assert telling_trial(np.array([True] * 4), phi, second) == 2
-    assert telling_trial(np.array([True, True, False, True]), phi, second) == 1
+    assert trial_that_shows_the_constraint(np.array([True] * 4), phi, second) == 2
+    assert trial_that_shows_the_constraint(np.array([True, True, False, True]), phi, second) == 1
     # A truth that covers no hypothesis tells nothing: the first that is feasible.
     none = np.array([False, False])
-    assert telling_trial(np.array([False, True, True, True]), phi, none) == 1
+    assert trial_that_shows_the_constraint(np.array([False, True, True, True]), phi, none) == 1
