@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-import mlci.inference
+import mlci.preparation
 from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, read_recorded_config
@@ -57,7 +57,7 @@ def infer(settings: RecordedSettings) -> int:
     if not demonstrations:
         raise ConfigError("demonstrations: no file could be used; see above")
     model = _tabular_model(settings)
-    inference = mlci.inference.infer(
+    inference = mlci.preparation.infer(
         model,
         demonstrations,
         prior_none=settings.inference.prior,

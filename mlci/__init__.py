@@ -30,8 +30,9 @@ from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.grids import Grid
-from mlci.inference import Inference, PreparedInference, infer, prepare
+from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
+from mlci.preparation import PreparedInference, infer, prepare
 from mlci.reachability import SafeSet, solve_safe_set
 from mlci.recordings.read import read_demonstrations, write_demonstration
 from mlci.regions import Regions

@@ -11,7 +11,8 @@ from experiments.point.stages import TrialSet, demonstrations, tabular_model
 from experiments.tracking.store import Store
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose
-from mlci.inference import Inference, infer
+from mlci.inference import Inference
+from mlci.preparation import infer
 from mlci.spaces import Bools, Ints
 from mlci.tabular import TabularModel
 

@@ -10,8 +10,8 @@ from experiments.config.settings import Settings
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.grids import Grid
-from mlci.inference import infer, prepare
 from mlci.maxent import TrajectoryDistribution
+from mlci.preparation import infer, prepare
 from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin

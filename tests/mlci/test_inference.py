@@ -10,8 +10,9 @@ import pytest
 from mlci.demonstrations import Demonstration, Task
 from mlci.evidence import Ranking, rank_constraints
 from mlci.grids import Grid
-from mlci.inference import Inference, PreparedInference, infer, prepare
+from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
+from mlci.preparation import PreparedInference, infer, prepare
 from mlci.regions import Regions
 from mlci.simulate import rollout
 from mlci.spaces import Box

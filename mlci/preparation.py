@@ -1,0 +1,180 @@
+"""From a tabular model and demonstrations to an `Inference`, in one step or in two.
+
+All that takes time depends on the tasks alone: starts, goals and durations. So `prepare` can do it
+before anybody moves, as section IV-C says; what is left when demonstrations arrive is to see which
+hypotheses they violate, and to rank the others. `infer` does both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import ArrayLike
+
+from mlci.demonstrations import Demonstration, Task
+from mlci.inference import Inference
+from mlci.maxent import TrajectoryDistribution
+from mlci.regions import Regions, as_mask
+from mlci.spaces import Bools, Floats
+from mlci.tabular import Progress, TabularModel
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedInference:
+    """What the ranking needs of N tasks that are known before anybody moves; made by `prepare`.
+
+    Attributes:
+        tasks: the N tasks.
+        hypotheses: the C hypotheses.
+        phi: (N, C) violation probabilities without a constraint; 0 where not reachable.
+        reachable: (N,) whether the tabular model can do the task.
+
+    Raises:
+        ValueError: shapes that disagree.
+    """
+
+    tasks: tuple[Task, ...]
+    hypotheses: Regions
+    phi: Floats
+    reachable: Bools
+
+    def __post_init__(self) -> None:
+        shape = len(self.tasks), len(self.hypotheses)
+        if self.phi.shape != shape or self.reachable.shape != shape[:1]:
+            raise ValueError(
+                f"phi {self.phi.shape} and reachable {self.reachable.shape} do not fit {shape[0]} "
+                f"tasks and {shape[1]} hypotheses"
+            )
+
+    def infer(
+        self,
+        paths: Sequence[ArrayLike],
+        tasks: Sequence[int] | None = None,
+        *,
+        names: Sequence[str] = (),
+        prior_none: float = 0.5,
+    ) -> Inference:
+        """Rank the hypotheses by the demonstrations that have arrived, equations (4) to (6).
+
+        Args:
+            paths: states (K+1, n) of each demonstration.
+            tasks: the number of each demonstration's task, in any order and as often as it was
+                done; by default each task was done once, in order.
+            names: of the demonstrations; their numbers by default.
+            prior_none: prior probability that there is no constraint.
+
+        Raises:
+            ValueError: a task that is not known, or not one task and name for each path.
+        """
+        numbers = np.arange(len(self.tasks)) if tasks is None else np.asarray(tasks, dtype=np.int64)
+        labels = tuple(names) or tuple(map(str, range(len(paths))))
+        if numbers.shape != (len(paths),) or len(labels) != len(paths):
+            raise ValueError(
+                f"{len(paths)} paths need as many tasks and names, not {numbers.tolist()} and "
+                f"{list(labels)}"
+            )
+        if np.any((numbers < 0) | (numbers >= len(self.tasks))):
+            raise ValueError(
+                f"tasks are numbered 0 to {len(self.tasks) - 1}, not {numbers.tolist()}"
+            )
+        return Inference(
+            self.hypotheses,
+            labels,
+            self.phi[numbers],
+            _violations(self.hypotheses, paths),
+            self.reachable[numbers],
+            prior_none,
+        )
+
+
+def infer(
+    model: TabularModel,
+    demonstrations: Sequence[Demonstration],
+    *,
+    hypotheses: ArrayLike | None = None,
+    prior_none: float = 0.5,
+    round_horizon: bool = False,
+    n_jobs: int = 1,
+    progress: Progress | None = None,
+) -> Inference:
+    """Rank hypotheses by demonstrations, equations (4) to (6).
+
+    Args:
+        model: the tabular model.
+        demonstrations: N demonstrations, each with a task of its own.
+        hypotheses: (C,) mask over the model's regions; None takes all.
+        prior_none: prior probability that there is no constraint.
+        round_horizon: take the nearest number of time steps where dt does not divide a duration.
+        n_jobs: tasks that are worked on at once; -1 is one a core. The result is the same.
+        progress: called with how many tasks are done, and of how many.
+
+    Raises:
+        ValueError: a start outside the state space, a duration that dt does not divide, or a mask
+            of the wrong shape.
+    """
+    prepared = prepare(
+        model,
+        [demonstration.task for demonstration in demonstrations],
+        hypotheses=hypotheses,
+        round_horizon=round_horizon,
+        n_jobs=n_jobs,
+        progress=progress,
+    )
+    paths = [demonstration.states for demonstration in demonstrations]
+    names = [
+        demonstration.name or str(number) for number, demonstration in enumerate(demonstrations)
+    ]
+    return prepared.infer(paths, names=names, prior_none=prior_none)
+
+
+def prepare(
+    model: TabularModel,
+    tasks: Sequence[Task],
+    *,
+    hypotheses: ArrayLike | None = None,
+    round_horizon: bool = False,
+    n_jobs: int = 1,
+    progress: Progress | None = None,
+) -> PreparedInference:
+    """Do beforehand whatever of the inference depends on the tasks alone; arguments as of `infer`.
+
+    Raises:
+        ValueError: as of `infer`.
+    """
+    count = len(model.regions)
+    mask = np.ones(count, dtype=bool) if hypotheses is None else as_mask(hypotheses, count)
+    distributions = [
+        TrajectoryDistribution.of_task(model, task, round_horizon=round_horizon) for task in tasks
+    ]
+    phi, reachable = np.zeros((len(tasks), count)), np.zeros(len(tasks), dtype=bool)
+    if tasks:
+        _ = model.merged  # once for all tasks and processes
+    work = Parallel(n_jobs=n_jobs, return_as="generator")(
+        delayed(_violation_probabilities)(distribution) for distribution in distributions
+    )
+    for j, (is_possible, probabilities) in enumerate(work):
+        reachable[j], phi[j] = is_possible, probabilities
+        if progress is not None:
+            progress(j + 1, len(tasks))
+    return PreparedInference(tuple(tasks), model.regions.select(mask), phi[:, mask], reachable)
+
+
+def _violation_probabilities(distribution: TrajectoryDistribution) -> tuple[bool, Floats]:
+    """Whether a task can be done, and Phi (C,) of it, 0 if it cannot."""
+    if distribution.is_possible:
+        return True, distribution.violation_probabilities()
+    return False, np.zeros(len(distribution.model.regions))
+
+
+def _violations(hypotheses: Regions, paths: Sequence[ArrayLike]) -> Bools:
+    """D (N, C): which hypotheses each path violates."""
+    violated = np.zeros((len(paths), len(hypotheses)), dtype=bool)
+    if len({np.shape(path) for path in paths}) == 1:  # all at once is quicker
+        violated[:] = hypotheses.violated_by(np.stack(paths))
+    else:
+        for row, path in zip(violated, paths, strict=True):
+            row[:] = hypotheses.violated_by(path)
+    return violated
