@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from experiments.config.paths import default_results
-from experiments.lookback.archive import Archive, ArchiveError, KeptPoint, select
-from experiments.lookback.cleaning import leftovers
+from experiments.lookback.archive import Archive, ArchiveError, Facts
+from experiments.lookback.cleaning import clean
 from experiments.lookback.export import file_bytes, tidy_table
 from experiments.lookback.freshness import point_concerns
+from experiments.lookback.query import select
 from experiments.lookback.views import (
     differences,
     point_facts,
@@ -41,10 +42,10 @@ def main() -> int:
     Returns:
         0; 2 if something that was asked for is not there.
     """
-    chosen = _parser().parse_args()
-    archive = Archive((chosen.results or default_results()).resolve())
+    options = _parser().parse_args()
+    archive = Archive((options.results or default_results()).resolve())
     try:
-        for line in chosen.command(archive, chosen):
+        for line in options.command(archive, options):
             print(line)
         sys.stdout.flush()
     except ArchiveError as error:
@@ -63,9 +64,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def add(name: str, command: Any, text: str) -> argparse.ArgumentParser:
-        added = commands.add_parser(name, help=text, description=text, parents=[common])
-        added.set_defaults(command=command)
-        return added
+        subparser = commands.add_parser(name, help=text, description=text, parents=[common])
+        subparser.set_defaults(command=command)
+        return subparser
 
     one = add("list", _list, "studies; or the points of one, or with `points` all points")
     one.add_argument("study", nargs="?", metavar="STUDY")
@@ -90,18 +91,18 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _list(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+def _list(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """Studies, or points."""
-    if chosen.study is None and not chosen.state:
+    if options.study is None and not options.state:
         return study_list(archive, _width())
-    study = None if chosen.study in (None, "points") else archive.study(chosen.study)
-    return point_list(archive, study, chosen.state or (), _width())
+    study = None if options.study in (None, "points") else archive.study(options.study)
+    return point_list(archive, study, options.state or (), _width())
 
 
-def _status(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+def _status(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """States of points, tables and figures, by study."""
-    if chosen.study:
-        yield from study_status(archive, archive.study(chosen.study))
+    if options.study:
+        yield from study_status(archive, archive.study(options.study))
         return
     yield from archive.unreadable
     for study in archive.studies.values():
@@ -110,75 +111,60 @@ def _status(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
         yield f"no study in {archive.results}"
 
 
-def _show(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+def _show(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """All about a point or a study."""
-    found = archive.find(chosen.name)
-    return study_facts(archive, found) if isinstance(found, Study) else point_facts(found)
+    item = archive.find(options.name)
+    return study_facts(archive, item) if isinstance(item, Study) else point_facts(item)
 
 
-def _diff(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+def _diff(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """What differs between two points."""
-    one, two = (_point(archive, name) for name in (chosen.one, chosen.two))
+    one, two = (_point(archive, name) for name in (options.one, options.two))
     return differences(one, two, _width())
 
 
-def _query(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+def _query(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """Points that meet conditions, with their summary."""
-    everywhere = chosen.study is None
-    points = (
-        archive.points.values() if everywhere else archive.points_of(archive.study(chosen.study))
-    )
-    found = select([point for point in points if point.content], chosen.conditions)
-    if not found:
-        raise ArchiveError(f"no finished point has {' '.join(chosen.conditions)}")
-    return summary_list(found, _width())
+    if options.study is None:
+        points = list(archive.points.values())
+    else:
+        points = archive.points_of(archive.study(options.study))
+    matches = select([point for point in points if point.record], options.conditions)
+    if not matches:
+        raise ArchiveError(f"no finished point has {' '.join(options.conditions)}")
+    return summary_list(matches, _width())
 
 
-def _export(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+def _export(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """One table of a study."""
-    if chosen.format == "parquet" and chosen.out is None:
+    if options.format == "parquet" and options.out is None:
         raise ArchiveError("--format parquet needs --out FILE: it is no text for a terminal")
-    points = archive.points_of(archive.study(chosen.study))
-    finished = [point for point in points if point.content]
+    points = archive.points_of(archive.study(options.study))
+    finished = [point for point in points if point.record]
     if not finished:
-        raise ArchiveError(f"{chosen.study}: no point is finished; run the sweep first")
-    table = tidy_table(finished, chosen.table)
-    data = file_bytes(table, chosen.format)
+        raise ArchiveError(f"{options.study}: no point is finished; run the sweep first")
+    table = tidy_table(finished, options.table)
+    data = file_bytes(table, options.format)
     if concerns := point_concerns(points):
-        print(f"{chosen.study}: {', '.join(concerns)}", file=sys.stderr)
-    if chosen.out is None:
+        print(f"{options.study}: {', '.join(concerns)}", file=sys.stderr)
+    if options.out is None:
         yield data.decode().rstrip("\n")
     else:
-        replace_file(chosen.out.resolve(), data)
-        yield f"written: {chosen.out} ({len(table)} rows, {table.shape[1]} columns)"
+        replace_file(options.out.resolve(), data)
+        yield f"written: {options.out} ({len(table)} rows, {table.shape[1]} columns)"
 
 
-def _clean(archive: Archive, chosen: argparse.Namespace) -> Iterator[str]:
+def _clean(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """What no study uses; removed if told."""
-    found, notes = leftovers(archive)
-    yield from notes
-    total = 0
-    for leftover in found:
-        size = leftover.size
-        if chosen.yes and not leftover.remove():
-            yield f"kept: {leftover.what}: in use now"
-            continue
-        total += size
-        yield f"{'removed' if chosen.yes else 'unused'}: {leftover.what} ({size / 1e6:.2f} MB)"
-    if not found:
-        yield "nothing to clean"
-    elif chosen.yes:
-        yield f"{total / 1e6:.1f} MB freed"
-    else:
-        yield f"{len(found)} things, {total / 1e6:.1f} MB; nothing is removed without --yes"
+    return clean(archive, remove=options.yes)
 
 
-def _point(archive: Archive, name: str) -> KeptPoint:
+def _point(archive: Archive, name: str) -> Facts:
     """A point that was asked for."""
-    found = archive.find(name)
-    if isinstance(found, Study):
+    item = archive.find(name)
+    if isinstance(item, Study):
         raise ArchiveError(f"{name}: is a study; give two points (see: list {name})")
-    return found
+    return item
 
 
 def _width() -> int | None:

@@ -11,37 +11,47 @@ from pathlib import Path
 
 import pandas as pd
 
+from experiments.collate.finished import LAST_OPENING
+
+
+def case_names(plan: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """The case of each point that has one, in the order of the plan.
+
+    Args:
+        plan: the overrides that make each point, by its identity, as the study lists them.
+    """
+    names = {}
+    for point, overrides in plan.items():
+        cases = [word.partition("=")[2] for word in overrides if word.startswith("case=")]
+        if cases and (name := cases[-1].strip("'\"")):
+            names[point] = name
+    return names
+
 
 def case_table(
-    summary: Path, points: Sequence[str], plan: Mapping[str, Sequence[str]]
+    summary: Path, points: Sequence[str], names: Mapping[str, str]
 ) -> pd.DataFrame | None:
     """The names of a study's cases, for joining with its tables of groups.
 
     Args:
         summary: the collated table of that name, a row a point.
         points: identities, in the order of those rows.
-        plan: the overrides that make each point, by its identity, as the study lists them.
+        names: the case of each point that has one, in the order of the plan.
 
     Returns:
         The columns that open those tables (all but `seed`), a row a group, the cases in the order
         of the plan; `case`, its name; `choice` and `value`, the parts of the name before and after
         its colon. None if no point has a name.
     """
-    place = {name: i for i, name in enumerate(dict.fromkeys(map(_name, plan.values())))}
-    names = [_name(plan.get(point, ())) for point in points]
-    if not any(names):
+    if not any(point in names for point in points):
         return None
     rows = pd.read_csv(summary, dtype=str, keep_default_na=False)
-    rows = rows[list(rows.columns[: rows.columns.get_loc("seed")])]
-    parts = [name.partition(": ") for name in names]
+    rows = rows[list(rows.columns[: rows.columns.get_loc(LAST_OPENING)])]
+    cases = [names.get(point, "") for point in points]
+    parts = [name.partition(": ") for name in cases]
     rows = rows.assign(
-        case=names, choice=[part[0] for part in parts], value=[part[2] for part in parts]
+        case=cases, choice=[part[0] for part in parts], value=[part[2] for part in parts]
     )
     rows = rows[rows["case"] != ""].drop_duplicates()
+    place = {name: i for i, name in enumerate(dict.fromkeys(names.values()))}
     return rows.sort_values("case", key=lambda case: case.map(place), kind="stable")
-
-
-def _name(overrides: Sequence[str]) -> str:
-    """The name among a point's overrides, or nothing."""
-    given = [word.partition("=")[2] for word in overrides if word.startswith("case=")]
-    return given[-1].strip("'\"") if given else ""

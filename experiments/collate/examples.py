@@ -1,246 +1,246 @@
 """Small tables of single points, for the figures that show one example rather than a sweep.
 
-Collating makes them for every study, a part for each truth, from tables of its points that are too
-large to keep beside the study.
+A study's YAML names them, and its plan keeps what it names:
+
+    examples:
+      ranking:
+        - {cells: 400, dt: 0.25, actions: 9, seed: 0}
+        - {cells: 100, dt: 0.1, actions: 9, seed: 0}
+      compared:
+        - {cells: [100, 900, 1600], dt: 0.5, actions: 9, seed: 0, trial: {c1: 3, c2: 52}}
+      first:
+        - {case: default, seed: 0}
+
+`ranking` shows one point a truth; `compared`, one trial a truth in several points; `first`, the
+first demonstrations of one point a truth and kind of tasks. Of the entries of each the first is
+taken that the study has points for. An entry gives values to columns that open tables, to dotted
+keys of the config or to `case`; a list allows several. Where an entry names no `trial`, it is the
+first that the tabular agent can follow in all compared points.
 """
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import fields, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from experiments.collate.settings_of import settings_of
-from experiments.point.tables import FIRST
-from experiments.point.truth_tables import box_table
-from mlci.grids import Grid
-from mlci.regions import Regions
-from mlci.spaces import Ints
+from experiments.collate.finished import CollateError, FinishedPoint
 
-if TYPE_CHECKING:
-    from experiments.tracking.points import Point
+FIRST = 5  # demonstrations that the points' table `first` is of
 
-
-# The point that stands for a truth: these values, or the nearest that the study holds; of several,
-# the one whose other settings most points have.
-CELLS, DT, ACTIONS = 400, 0.25, 9
-# The grids whose trajectories are compared, coarse to fine, or the nearest that the study holds.
-COMPARED = (100, 900, 1600)
-
-_MOST_TRUTHS = 4  # of a study that has examples: of more, they would be neither few nor small
-_ENOUGH = 0.9  # of the demonstrations are feasible in all compared grids at a dt that can be chosen
 _PATH_EVERY = 2  # samples of the table `paths` between those that are drawn of many paths
 _DECIMALS = 4  # of paths, which are only drawn
 _CORNER_DECIMALS = 6  # of boxes, likewise, whose edges meet
 
+Tables = dict[str, pd.DataFrame]
+Entry = Mapping[str, Any]
 
-def example_tables(points: Sequence[Point]) -> dict[str, pd.DataFrame]:
+
+def example_tables(
+    points: Sequence[FinishedPoint],
+    examples: Mapping[str, Sequence[Entry]],
+    cases: Mapping[str, str],
+    log: Callable[[str], None],
+) -> Tables:
     """The tables of a study's examples, each opened by truth and the settings of a point.
 
     Args:
-        points: finished points, in the order of the study's tables.
+        points: the points, in the order of the study's tables; of several that an entry allows,
+            the first is taken.
+        examples: what the study names: a list of entries for `ranking`, `compared` and `first`.
+        cases: the name of each point's case, by its identity.
+        log: is told which examples are missing, a line each.
 
     Returns:
-        Of one point a truth, `example_ranking`, its table `hypotheses` with Phi of one trial;
-        `example_paths`, its demonstrations, thinned out; `example_cells`, the cells of that
-        trial's sampled trajectory; `example_moves`, the moves from these cells; and its own
-        `example_regions` and `example_dimensions`. And of one trial a truth in several grids,
-        `compared_cells`, `compared_violations` and `compared_paths`. And of one point a truth and
-        kind of tasks, all of whose settings are those of most points, `first_ranking`,
-        `first_paths` and `first_violations`: its first demonstrations, and what they tell. A study
-        of many truths has none of these.
+        For `ranking`: `example_ranking`, the table `hypotheses` with Phi of one trial;
+        `example_paths`, the demonstrations, thinned out; `example_cells`, the cells of that trial's
+        sampled trajectory; `example_moves`, the moves from these cells; `example_regions` and
+        `example_dimensions`. For `compared`: `compared_cells`, `compared_violations` and
+        `compared_paths`. For `first`: `first_ranking`, `first_paths` and `first_violations`, the
+        first demonstrations and what they say. An example that is missing has no rows, and a table
+        without any example is left out.
+
+    Raises:
+        CollateError: an example that there is no table for.
     """
-    tables: dict[str, list[pd.DataFrame]] = {
-        **{
-            f"example_{name}": []
-            for name in ("ranking", "paths", "cells", "moves", "regions", "dimensions")
-        },
-        **{f"compared_{name}": [] for name in ("cells", "violations", "paths")},
-        **{f"first_{name}": [] for name in ("ranking", "paths", "violations")},
-    }
-    truths = sorted({_truth(point) for point in points})
-    if len(truths) > _MOST_TRUTHS:
-        return {}
-    unusual = _unusual(points)
-    for truth in truths:
-        of_truth = [point for point in points if _truth(point) == truth]
-        example = min(of_truth, key=lambda point: (*_distance(point), unusual[point.identity]))
-        for name, table in _example(example).items():
-            tables[name].append(table)
-        trial, alike = _comparison(example, of_truth)
-        for point in alike:
-            tables["compared_cells"].append(_cells(point, trial))
-            tables["compared_violations"].append(_violations(point, trial))
-        path = _of_trial(_read(example, "paths"), trial, "demonstration")
-        tables["compared_paths"].append(path.round(_DECIMALS))
-        for crossing in sorted({settings_of(point).tasks.crossing for point in of_truth}):
-            alike = [point for point in of_truth if settings_of(point).tasks.crossing == crossing]
-            usual = min(alike, key=lambda point: (unusual[point.identity], settings_of(point).seed))
-            for name, table in _first(usual).items():
-                table.insert(0, "tasks.crossing", crossing)
-                tables[f"first_{name}"].append(table)
-    return {name: _joined(parts) for name, parts in tables.items()}
+    if unknown := sorted(set(examples) - set(_MAKERS)):
+        raise CollateError(f"examples: {', '.join(unknown)}: there are {', '.join(_MAKERS)}")
+    facts = {point.identity: _facts(point, cases) for point in points}
+    parts: dict[str, list[pd.DataFrame]] = {}
+    for kind, entries in examples.items():
+        keys, make = _MAKERS[kind]
+        groups: dict[tuple[Any, ...], list[FinishedPoint]] = {}
+        for point in points:
+            group = tuple(facts[point.identity][key] for key in keys)
+            groups.setdefault(group, []).append(point)
+        for group in sorted(groups):
+            common = dict(zip(keys, group, strict=True))
+            meant = [e for e in entries if _meets(common, {k: e[k] for k in keys if k in e})]
+            tables = _first_example(groups[group], facts, meant, make)
+            for name, table in tables.items():
+                parts.setdefault(name, []).append(table)
+            if meant and not tables:
+                where = ", ".join(f"{key} {value}" for key, value in common.items())
+                log(f"examples.{kind}: no point of {where} is as named, so it shows none")
+    return {name: _below_one_another(tables) for name, tables in parts.items()}
 
 
-def _truth(point: Point) -> str:
-    """The name of a point's truth in tables."""
-    return str(settings_of(point).columns["truth"])
+def _first_example(
+    points: Sequence[FinishedPoint],
+    facts: Mapping[str, Entry],
+    entries: Sequence[Entry],
+    make: Callable[[Sequence[FinishedPoint], Any], Tables],
+) -> Tables:
+    """The tables of the first entry that there is an example for; else nothing."""
+    for entry in entries:
+        conditions = {key: value for key, value in entry.items() if key != "trial"}
+        alike = [point for point in points if _meets(facts[point.identity], conditions)]
+        if alike and (tables := make(alike, entry.get("trial"))):
+            return tables
+    return {}
 
 
-def _distance(point: Point) -> tuple[float, ...]:
-    """How far a point is from the example; the first difference decides."""
-    settings = settings_of(point)
-    return (
-        abs(math.prod(settings.grid.shape) - CELLS),
-        abs(settings.dt - DT),
-        abs(math.prod(settings.action_counts) - ACTIONS),
-        settings.transition.samples,
-        settings.seed,
+def _facts(point: FinishedPoint, cases: Mapping[str, str]) -> dict[str, Any]:
+    """What entries can give values to."""
+    return {**point.config, **point.opening, "case": cases.get(point.identity, "")}
+
+
+def _meets(facts: Entry, conditions: Entry) -> bool:
+    """Whether facts have the values of all conditions, or one of several."""
+    return all(
+        key in facts
+        and any(
+            _same(facts[key], value)
+            for value in (allowed if isinstance(allowed, list) else [allowed])
+        )
+        for key, allowed in conditions.items()
     )
 
 
-def _unusual(points: Sequence[Point]) -> dict[str, int]:
-    """How many settings of each point are not those of most points, by its identity."""
-    counts: dict[str, int] = dict.fromkeys((point.identity for point in points), 0)
-    for field in fields(settings_of(points[0])):
-        values = {point.identity: repr(getattr(settings_of(point), field.name)) for point in points}
-        times = Counter(values.values())
-        usual = min(times, key=lambda value: (-times[value], value))
-        for identity, value in values.items():
-            counts[identity] += value != usual
-    return counts
+def _same(fact: object, value: object) -> bool:
+    """Whether two values are equal; a table spells numbers as text."""
+    if isinstance(fact, str) and isinstance(value, int | float):
+        try:
+            return float(fact) == value
+        except ValueError:
+            return False
+    return fact == value
 
 
-def _example(point: Point) -> dict[str, pd.DataFrame]:
-    """The tables of one point."""
-    probabilities = _read(point, "probabilities")
-    trial = int(probabilities["trial"].iloc[0]) if len(probabilities) else -1
+def _ranking(points: Sequence[FinishedPoint], _: object) -> Tables:
+    """The tables of one point, with one of its trials."""
+    point = points[0]
+    probabilities, paths = point.table("probabilities"), point.table("paths")
     phi = probabilities[["hypothesis", "trial", "unconstrained", "constrained"]]
-    ranking = _named(point, _read(point, "hypotheses")).merge(phi, on="hypothesis", how="left")
-    paths = _read(point, "paths")
-    place = paths.groupby("demonstration").cumcount()
-    last = paths.groupby("demonstration")["time"].transform("max") == paths["time"]
+    place = paths.groupby("demonstration", sort=False).cumcount()
+    last = ~paths.duplicated("demonstration", keep="last")
     return {
-        "example_ranking": ranking,
-        "example_paths": paths[(place % _PATH_EVERY == 0) | last].round(_DECIMALS),
-        "example_cells": _cells(point, trial),
+        "example_ranking": _named(point, "hypotheses").merge(phi, on="hypothesis", how="left"),
+        "example_paths": _rounded(point, paths[(place % _PATH_EVERY == 0) | last]),
+        "example_cells": _cells(point, probabilities["trial"].iloc[:1].tolist()),
         "example_moves": _moves(point),
-        "example_regions": _read(point, "regions"),
-        "example_dimensions": _read(point, "dimensions"),
+        "example_regions": point.table("regions"),
+        "example_dimensions": point.table("dimensions"),
     }
 
 
-def _first(point: Point) -> dict[str, pd.DataFrame]:
-    """The ranking by a point's first demonstrations, their paths and what each violates."""
-    paths, violations = _read(point, "paths"), _read(point, "violations")
-    first = sorted(paths["demonstration"].unique())[:FIRST]
-    shown = violations["trial"].isin(first) & (violations["source"] == "demonstration")
+def _compared(points: Sequence[FinishedPoint], trial: Mapping[str, int] | int | None) -> Tables:
+    """One trial in several points; nothing unless the tabular agent can follow it in all."""
+    followed = [point.table("trials") for point in points]
+    possible = set.intersection(
+        *(set(table["trial"][table["feasible"] == "True"].map(int)) for table in followed)
+    )
+    if isinstance(trial, Mapping):
+        trial = trial.get(points[0].opening["truth"])
+    if trial is None and possible:
+        trial = min(possible)
+    if trial not in possible:
+        return {}
+    shown = [str(trial)]
+    violations = [_violations(point, shown) for point in points]
+    paths = points[0].table("paths")
     return {
-        "ranking": _named(point, _read(point, "first")),
-        "paths": paths[paths["demonstration"].isin(first)].round(_DECIMALS),
-        "violations": _with_boxes(violations[shown], "hypothesis", _hypothesis_boxes(point)),
+        "compared_cells": pd.concat([_cells(point, shown) for point in points]),
+        "compared_violations": pd.concat(violations),
+        "compared_paths": _rounded(points[0], paths[paths["demonstration"].isin(shown)]),
     }
 
 
-def _comparison(example: Point, points: Sequence[Point]) -> tuple[int, list[Point]]:
-    """The points that are compared, coarse to fine, and the trial; -1 if there is none for all.
-
-    They differ from the example in the grid and, all alike, in dt: the dt nearest to the
-    example's at which nearly all demonstrations are feasible in all of these grids, or, where
-    there is none, the most. The trial is the one of them that passes nearest to the truth.
-    """
-    own = settings_of(example)
-    by_dt: dict[float, list[Point]] = {}
-    for point in points:
-        if replace(settings_of(point), grid=own.grid, dt=own.dt) == own:
-            by_dt.setdefault(settings_of(point).dt, []).append(point)
-    enough = _ENOUGH * len(_read(example, "trials"))
-    trials, alike = np.empty(0, dtype=np.int64), [example]
-    for dt in sorted(by_dt, key=lambda dt: (abs(dt - own.dt), dt)):
-        closest = [min(by_dt[dt], key=lambda p: abs(_count(p) - cells)) for cells in COMPARED]
-        these = list({point.identity: point for point in closest}.values())
-        found = _feasible_in_all(these)
-        if len(found) > len(trials):
-            trials, alike = found, these
-        if len(trials) >= enough:
-            break
-    paths = _read(example, "paths")
-    paths = paths[paths["demonstration"].isin(trials)]
-    names = list(settings_of(example).model.space.names)
-    distance = settings_of(example).constraint.signed_distance(paths[names].to_numpy())
-    return (int(paths["demonstration"].iloc[np.argmin(distance)]) if len(paths) else -1), alike
+def _first(points: Sequence[FinishedPoint], _: object) -> Tables:
+    """The ranking by a point's first demonstrations, their paths and what each violates."""
+    point = points[0]
+    paths = point.table("paths")
+    first = sorted(paths["demonstration"].unique(), key=int)[:FIRST]
+    violations = _violations(point, first)
+    tables = {
+        "first_ranking": _named(point, "first"),
+        "first_paths": _rounded(point, paths[paths["demonstration"].isin(first)]),
+        "first_violations": violations[violations["source"] == "demonstration"].copy(),
+    }
+    for table in tables.values():
+        table.insert(0, "tasks.crossing", point.config["tasks.crossing"])
+    return tables
 
 
-def _count(point: Point) -> int:
-    """Cells of a point's grid."""
-    return math.prod(settings_of(point).grid.shape)
+# Of each kind of example: what has one of its own, and what makes its tables.
+_MAKERS: dict[str, tuple[tuple[str, ...], Callable[[Sequence[FinishedPoint], Any], Tables]]] = {
+    "ranking": (("truth",), _ranking),
+    "compared": (("truth",), _compared),
+    "first": (("truth", "tasks.crossing"), _first),
+}
 
 
-def _feasible_in_all(points: Sequence[Point]) -> Ints:
-    """Trials whose goal the tabular agent reaches under the truth, at each of some points."""
-    tables = [_read(point, "trials") for point in points]
-    return np.array(
-        sorted(set.intersection(*(set(table["trial"][table["feasible"]]) for table in tables))),
-        dtype=np.int64,
-    )
-
-
-def _cells(point: Point, trial: int) -> pd.DataFrame:
-    """The cells that a trial's sampled trajectory visits, with their corners."""
-    visits = _named(point, _of_trial(_read(point, "sampled"), trial).copy())
-    return _with_boxes(visits, "cell", _grid_boxes(settings_of(point).cells))
-
-
-def _moves(point: Point) -> pd.DataFrame:
-    """The moves of the cells that the first trajectory visits, with both cells' corners."""
-    boxes = _grid_boxes(settings_of(point).cells)
-    moves = _with_boxes(_read(point, "moves"), "cell", boxes)
-    return _with_boxes(moves, "successor", boxes.add_prefix("successor_"))
-
-
-def _violations(point: Point, trial: int) -> pd.DataFrame:
-    """The hypotheses that a trial's demonstration and sampled trajectory violate, with corners."""
-    return _with_boxes(
-        _of_trial(_read(point, "violations"), trial), "hypothesis", _hypothesis_boxes(point)
-    )
-
-
-def _hypothesis_boxes(point: Point) -> pd.DataFrame:
-    """The corners of every hypothesis."""
-    return box_table("hypothesis", settings_of(point).candidates).drop(columns="hypothesis")
-
-
-def _grid_boxes(grid: Grid) -> pd.DataFrame:
-    """The corners of every cell of a grid."""
-    return box_table("cell", Regions(grid.space, *grid.corners)).drop(columns="cell")
-
-
-def _with_boxes(rows: pd.DataFrame, key: str, boxes: pd.DataFrame) -> pd.DataFrame:
-    """Rows with the corners of the box that their column `key` numbers, as they are drawn."""
-    return rows.join(boxes.round(_CORNER_DECIMALS), on=key)
-
-
-def _of_trial(table: pd.DataFrame, trial: int, column: str = "trial") -> pd.DataFrame:
-    """The rows of one trial."""
-    return table[table[column] == trial]
-
-
-def _read(point: Point, name: str) -> pd.DataFrame:
-    """A table of a point."""
-    return pd.read_csv(point.folder / f"{name}.csv")
-
-
-def _named(point: Point, table: pd.DataFrame) -> pd.DataFrame:
-    """A table opened by the point's identity."""
+def _named(point: FinishedPoint, name: str) -> pd.DataFrame:
+    """A table of a point, opened by its identity."""
+    table = point.table(name)
     table.insert(0, "point", point.identity)
     return table
 
 
-def _joined(parts: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """Tables below one another; the type of a column is not left to those without rows."""
-    return pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
+def _cells(point: FinishedPoint, trials: Sequence[str]) -> pd.DataFrame:
+    """The cells that the sampled trajectories of trials visit, with their corners."""
+    visits = _named(point, "sampled")
+    return visits[visits["trial"].isin(trials)].join(_cell_boxes(point), on="cell")
+
+
+def _moves(point: FinishedPoint) -> pd.DataFrame:
+    """The moves of the cells that the example's trajectory visits, with both cells' corners."""
+    boxes = _cell_boxes(point)
+    moves = point.table("moves").join(boxes, on="cell")
+    return moves.join(boxes.add_prefix("successor_"), on="successor")
+
+
+def _violations(point: FinishedPoint, trials: Sequence[str]) -> pd.DataFrame:
+    """The hypotheses that trials and their sampled trajectories violate, with corners."""
+    violations = point.table("violations")
+    hypotheses = point.table("hypotheses").set_index("hypothesis")
+    corners = hypotheses.filter(regex="^(lower|upper)_").astype(float).round(_CORNER_DECIMALS)
+    return violations[violations["trial"].isin(trials)].join(corners, on="hypothesis")
+
+
+def _cell_boxes(point: FinishedPoint) -> pd.DataFrame:
+    """The corners of every cell of a point's grid, by its number."""
+    dimensions = point.table("dimensions")
+    lower, upper = (dimensions[side].astype(float).to_numpy() for side in ("lower", "upper"))
+    grid = point.record["config"]["grid"]
+    shape = np.array(grid["shape"])
+    widths = (upper - lower) / shape
+    first = lower + np.array(grid["offset"] or 0.0) * widths
+    place = np.indices(grid["shape"]).reshape(len(shape), -1).T
+    corners = np.hstack([first + place * widths, first + (place + 1) * widths])
+    names = [f"{side}_{name}" for side in ("lower", "upper") for name in dimensions["name"]]
+    numbers = [str(number) for number in range(len(corners))]
+    return pd.DataFrame(corners.round(_CORNER_DECIMALS), index=numbers, columns=names)
+
+
+def _rounded(point: FinishedPoint, paths: pd.DataFrame) -> pd.DataFrame:
+    """Paths as exact as they are drawn."""
+    values = ["time", *point.table("dimensions")["name"]]
+    return paths.assign(**paths[values].astype(float).round(_DECIMALS))
+
+
+def _below_one_another(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Tables in one; the type of a column is not left to those without rows."""
+    return pd.concat([table for table in tables if len(table)] or tables[:1], ignore_index=True)

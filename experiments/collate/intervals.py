@@ -12,7 +12,7 @@ statistic.
 With one seed an interval holds the second level alone; in `rank_curve` this is no more than the
 choice of the subsets, and tells nothing of other demonstrations. With S seeds the variance between
 them comes out too small by (S - 1) / S. The pooled violation distance is the mean of what each
-demonstration adds to it (`mlci.metrics.ViolationDistance`), and is resampled as such a mean.
+demonstration adds to it, and is resampled as such a mean.
 
 Every group of `measures`, and every number of demonstrations of a group in `rank_curve`, has a
 random stream of its own, derived from its key, and orders what it draws from: none depends on
@@ -27,11 +27,15 @@ from pathlib import Path
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
-from mlci.spaces import Floats, Ints
+from experiments.collate.finished import LAST_OPENING
 
-_RESAMPLES = 1000
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+RESAMPLES = 1000
 _DRAWS_AT_ONCE = 1 << 16  # that stay in the cache
 TAILS = (0.025, 0.975)  # of a 95 % interval
 
@@ -65,8 +69,8 @@ def measures(trials: pd.DataFrame) -> pd.DataFrame:
         seeds, names = _sizes(group), _columns_after(group, "trial")
         values = group[names].to_numpy(dtype=float)
         there = np.sum(~np.isnan(values), axis=0)
-        found = _mean_and_limits(values, resamples(seeds, list(opening.values())))
-        for name, count, *limits in zip(names, there, *found, strict=True):
+        means = _mean_and_limits(values, resamples(seeds, list(opening.values())))
+        for name, count, *limits in zip(names, there, *means, strict=True):
             row = {**opening, "measure": name}
             row |= dict(zip(("mean", "low", "high"), limits, strict=True))
             rows.append({**row, "seeds": len(seeds), "demonstrations": int(count)})
@@ -97,8 +101,8 @@ def rank_curve(ranks: pd.DataFrame) -> pd.DataFrame:
             row = {**opening, "demonstrations": size}
             row |= dict(zip(("median", "q10", "q25", "q75", "q90"), quantiles, strict=True))
             row |= dict(zip(("median_low", "median_high"), limits, strict=True))
-            found = _mean_and_limits(subsets[shares].to_numpy(dtype=float), counts)
-            for name, *values in zip(shares, *found, strict=True):
+            means = _mean_and_limits(subsets[shares].to_numpy(dtype=float), counts)
+            for name, *values in zip(shares, *means, strict=True):
                 row |= dict(zip((name, f"{name}_low", f"{name}_high"), values, strict=True))
             rows.append({**row, "seeds": len(seeds)})
     return pd.DataFrame(rows)
@@ -117,26 +121,27 @@ def resamples(sizes: Ints, key: Sequence[str]) -> Ints:
     state = np.frombuffer(hashlib.sha256("\0".join(key).encode()).digest(), dtype="<u4")
     rng = np.random.default_rng(state)
     first = np.concatenate([[0], np.cumsum(sizes)])
-    seed = rng.integers(0, len(sizes), (_RESAMPLES, len(sizes)))
-    counts = np.empty((_RESAMPLES, first[-1]), dtype=np.intp)
+    seed = rng.integers(0, len(sizes), (RESAMPLES, len(sizes)))
+    counts = np.empty((RESAMPLES, first[-1]), dtype=np.intp)
     at_once = max(1, _DRAWS_AT_ONCE // int(len(sizes) * sizes.max()))
-    for begin in range(0, _RESAMPLES, at_once):
-        drawn = seed[begin : begin + at_once]
-        size = sizes[drawn][..., None]
-        share = rng.random((*drawn.shape, sizes.max()), dtype=np.float32)
-        row = np.arange(len(drawn))[:, None, None] * first[-1] + first[drawn][..., None]
+    for begin in range(0, RESAMPLES, at_once):
+        seeds = seed[begin : begin + at_once]
+        size = sizes[seeds][..., None]
+        share = rng.random((*seeds.shape, sizes.max()), dtype=np.float32)
+        row = np.arange(len(seeds))[:, None, None] * first[-1] + first[seeds][..., None]
         row = row + (share * size).astype(np.intp)
         # A seed with fewer rows than the largest takes as many of the draws as it has rows.
         row = row[np.broadcast_to(np.arange(sizes.max()) < size, row.shape)]
-        total = np.bincount(row, minlength=len(drawn) * first[-1])
-        counts[begin : begin + at_once] = total.reshape(len(drawn), first[-1])
+        total = np.bincount(row, minlength=len(seeds) * first[-1])
+        counts[begin : begin + at_once] = total.reshape(len(seeds), first[-1])
     return counts
 
 
 def _read(path: Path) -> pd.DataFrame:
     """A collated table, with its opening columns as they are spelt."""
     names = list(pd.read_csv(path, nrows=0).columns)
-    opening, rest = names[: names.index("seed")], names[names.index("seed") :]
+    end = names.index(LAST_OPENING)
+    opening, rest = names[:end], names[end:]
     return pd.read_csv(
         path,
         dtype=dict.fromkeys(opening, str),
@@ -147,8 +152,8 @@ def _read(path: Path) -> pd.DataFrame:
 
 def _groups(table: pd.DataFrame, order: list[str]) -> Iterator[tuple[dict[str, str], pd.DataFrame]]:
     """Each group with its opening columns, by size or name; its rows by seed, then `order`."""
-    opening = list(table.columns)[: list(table.columns).index("seed")]
-    rows = table.sort_values(["seed", *order], kind="stable")
+    opening = list(table.columns)[: list(table.columns).index(LAST_OPENING)]
+    rows = table.sort_values([LAST_OPENING, *order], kind="stable")
     groups = dict(iter(rows.groupby(opening, sort=False, observed=True)))
     for key in sorted(groups, key=lambda key: [_by_size(str(value)) for value in key]):
         yield dict(zip(opening, map(str, key), strict=True)), groups[key]
@@ -170,7 +175,7 @@ def _by_size(value: str) -> tuple[float, str]:
 
 def _sizes(group: pd.DataFrame) -> Ints:
     """(S,) rows of each seed."""
-    return np.unique(group["seed"], return_counts=True)[1]
+    return np.unique(group[LAST_OPENING], return_counts=True)[1]
 
 
 def _mean_and_limits(values: Floats, counts: Ints) -> tuple[Floats, Floats, Floats]:

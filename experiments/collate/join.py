@@ -1,42 +1,37 @@
-"""Tables as CSV: one a measure and point, then one a measure for the whole study.
+"""Collating: the tables of a study's points, joined into one table a measure for the whole study.
 
-Collating copies rows as text, so a study's table holds exactly the numbers that points wrote. What
-`experiments.collate.intervals` makes of these tables stands beside them.
+Values are copied as they are spelt, so a study's table holds exactly the numbers that points wrote.
+Beside them stand the tables that are made of these: intervals, reliability, examples and cases.
 """
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import io
-import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any
 
 import pandas as pd
 
-from experiments.collate.cases import case_table
+from experiments.collate.cases import case_names, case_table
 from experiments.collate.examples import example_tables
+from experiments.collate.finished import CollateError, FinishedPoint
 from experiments.collate.intervals import study_tables
 from experiments.collate.reliability import reliability
-from experiments.collate.settings_of import settings_of
-from experiments.point.tables import opening_columns
-from experiments.point.truth_tables import TRUTH_TABLES
 from experiments.tracking.files import csv_bytes, digest, replacing
-from experiments.tracking.study import collated, whole_study, write_collated
-from experiments.tracking.trees import flatten
-
-if TYPE_CHECKING:
-    from experiments.tracking.points import Point
+from experiments.tracking.points import Point
+from experiments.tracking.study import Study, collated, whole_study, write_collated
 
 
-class CollateError(Exception):
-    """Points that cannot stand in one table; the message names them."""
-
-
-def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> list[Path]:
+def collate(
+    points: Sequence[Point],
+    folder: Path,
+    *,
+    mixed: bool = False,
+    log: Callable[[str], None] = print,
+) -> list[Path]:
     """Write one table a measure for all points of a study, and list what they came from.
 
     Rows are ordered by the points' settings, then as each point wrote them. A setting that
@@ -46,6 +41,7 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
         points: the points, in any order; each finished.
         folder: the study's folder.
         mixed: whether points may come from different versions of the source.
+        log: is told which of the study's examples are missing, a line each.
 
     Returns:
         the tables' paths.
@@ -53,170 +49,164 @@ def collate(points: Sequence[Point], folder: Path, *, mixed: bool = False) -> li
     Raises:
         CollateError: a point that is not finished, or whose source or columns differ.
     """
-    records = {point.identity: _read_record(point) for point in points}
-    by_source: dict[str, list[str]] = {}
-    for identity, record in records.items():
-        by_source.setdefault(record["source"], []).append(identity)
-    if len(by_source) > 1 and not mixed:
-        raise CollateError(_describe_mixture(by_source))
-    flat = {point.identity: flatten(dict(point.config)) for point in points}
-    ordered = sorted(
-        points,
-        key=lambda point: (
-            _sort_key(settings_of(point).columns),
-            _sort_key(flat[point.identity]),
-            point.identity,
-        ),
-    )
-    names = sorted({name for record in records.values() for name in record["files"]} - {"log.txt"})
-    alone = [[point] for point in ordered]
-    alone_extra = _extra_columns(alone, "", flat)
-    digests, joined = {}, {}
-    with ExitStack() as written:  # no table takes its place unless all are whole
-        for name in names:
-            groups, extra = alone, alone_extra
-            if Path(name).stem in TRUTH_TABLES:
-                same: dict[str, list[Point]] = {}
-                for point in ordered:
-                    content = records[point.identity]["files"].get(name, "")
-                    same.setdefault(content, []).append(point)
-                groups = list(same.values())
-                extra = _extra_columns(groups, Path(name).stem, flat)
-            file = written.enter_context(replacing(folder / "tables" / name))
-            first = [(group[0], records[group[0].identity]["files"].get(name)) for group in groups]
-            digests[name] = _join(file, name, first, extra, flat)
-            file.flush()
-            joined[Path(name).stem] = Path(file.name)
-        whole = {**example_tables(ordered), **study_tables(joined)}
-        if "calibration" in joined:
-            whole["reliability"] = reliability(pd.read_csv(joined["calibration"]))
-        plan = whole_study(folder)
-        listed = [point.identity for point in ordered]
-        cases = case_table(joined["summary"], listed, plan.points if plan else {})
-        if cases is not None:
-            whole["cases"] = cases
-        for name, frame in whole.items():
-            data = csv_bytes(frame)
-            written.enter_context(replacing(folder / "tables" / f"{name}.csv")).write(data)
-            digests[f"{name}.csv"] = digest(data)
-    _forget_others(folder, digests)
-    records = {point.identity: records[point.identity] for point in ordered}
+    finished = sorted(map(FinishedPoint.read, points), key=_order)
+    if not mixed:
+        _refuse_mixture(finished)
+    study = whole_study(folder)
+    digests: dict[str, str] = {}
+    with ExitStack() as files:  # no table takes its place unless all are whole
+        joined: dict[str, Path] = {}
+        for name in sorted({name for point in finished for name in point.tables}):
+            parts = joined_parts(name, finished)
+            joined[name], digests[f"{name}.csv"] = _write(folder, name, parts, files)
+        for name, frame in _made_tables(finished, joined, study, log).items():
+            _, digests[f"{name}.csv"] = _write(folder, name, [csv_bytes(frame)], files)
+    _remove_former(study, digests, folder)
+    records = {point.identity: point.record for point in finished}
     write_collated(folder, collated(records, digests))
     return [folder / "tables" / name for name in sorted(digests)]
 
 
-def _forget_others(folder: Path, tables: Mapping[str, str]) -> None:
+def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
+    """The header of a table, then its rows, a part for each point.
+
+    A table that opens with fewer columns than the others, such as one of the truth alone, is the
+    same for many points; of those that have it alike the first stands for all.
+
+    Args:
+        name: the table.
+        points: the points, in the order of their rows.
+
+    Raises:
+        CollateError: a point lacks the table, or has other columns than the first.
+    """
+    columns = list(points[0].table(name).columns)
+    opening = list(takewhile(points[0].opening.__contains__, columns))
+    groups = [[point] for point in points]
+    if len(opening) < len(points[0].opening):
+        by_content: dict[str, list[FinishedPoint]] = {}
+        for point in points:
+            by_content.setdefault(point.table_digest(name), []).append(point)
+        groups = list(by_content.values())
+    extra = _extra_columns(groups, opening)
+    yield csv_bytes(pd.DataFrame(columns=[*extra, *columns]))
+    for point, *_ in groups:
+        table = point.table(name)
+        if list(table.columns) != columns:
+            raise CollateError(
+                f"the columns of {point.folder / name}.csv are {','.join(table.columns)}, "
+                f"not {','.join(columns)}"
+            )
+        front = {key: point.config.get(key, "") for key in extra}
+        yield csv_bytes(pd.DataFrame({**front, **table}, index=table.index), header=False)
+
+
+def _made_tables(
+    points: Sequence[FinishedPoint],
+    joined: Mapping[str, Path],
+    study: Study | None,
+    log: Callable[[str], None],
+) -> dict[str, pd.DataFrame]:
+    """The tables that are made of those of the points."""
+    names = case_names(study.points if study else {})
+    examples = study.examples if study else {}
+    made = {**example_tables(points, examples, names, log), **study_tables(joined)}
+    if "calibration" in joined:
+        made["reliability"] = reliability(pd.read_csv(joined["calibration"]))
+    cases = case_table(joined["summary"], [point.identity for point in points], names)
+    return made if cases is None else {**made, "cases": cases}
+
+
+def _write(folder: Path, name: str, parts: Iterable[bytes], files: ExitStack) -> tuple[Path, str]:
+    """Write a table that takes its place when `files` close; where it is until then, its digest."""
+    file = files.enter_context(replacing(folder / "tables" / f"{name}.csv"))
+    for part in parts:
+        file.write(part)
+    file.flush()
+    path = Path(file.name)
+    return path, digest(path.read_bytes())
+
+
+def _remove_former(study: Study | None, tables: Iterable[str], folder: Path) -> None:
     """Remove the tables that the study listed before and does not have any more."""
-    before = whole_study(folder)
-    for name in before.collated.tables if before and before.collated else ():
-        if name not in tables:
-            (folder / "tables" / name).unlink(missing_ok=True)
+    former = study.collated.tables if study and study.collated else ()
+    for name in set(former).difference(tables):
+        (folder / "tables" / name).unlink(missing_ok=True)
 
 
-def _read_record(point: Point) -> dict[str, Any]:
-    """A point's record; its files are checked when they are read."""
-    try:
-        record: dict[str, Any] = json.loads((point.folder / "record.json").read_bytes())
-        if record["identity"] == point.identity:
-            return record
-    except (OSError, ValueError, KeyError, TypeError):
-        pass
-    raise CollateError(f"point {point.identity} is not finished: {point.folder}")
-
-
-def _describe_mixture(by_source: Mapping[str, Sequence[str]]) -> str:
-    """Which points come from which version of the source, most first."""
+def _refuse_mixture(points: Sequence[FinishedPoint]) -> None:
+    """Raise unless all points come from one version of the source; say which do not."""
+    by_source: dict[str, list[str]] = {}
+    for point in points:
+        by_source.setdefault(point.record["source"], []).append(point.identity)
+    if len(by_source) == 1:
+        return
     lines = [
-        f"  {source[:12]}: {len(points)} points, such as {points[0]}"
-        for source, points in sorted(by_source.items(), key=lambda item: -len(item[1]))
+        f"  {source[:12]}: {len(identities)} points, such as {identities[0]}"
+        for source, identities in sorted(by_source.items(), key=lambda item: -len(item[1]))
     ]
-    return "\n".join(
-        [
-            "these points come from different versions of the source, and no table is written; "
-            "run the sweep again, or tell it to mix them with sweep.mix_sources=true:",
-            *lines,
-        ]
+    raise CollateError(
+        "\n".join(
+            [
+                "these points come from different versions of the source, and no table is "
+                "written; run the sweep again, or tell it to mix them with "
+                "sweep.mix_sources=true:",
+                *lines,
+            ]
+        )
     )
 
 
-def _join(
-    file: BinaryIO,
-    name: str,
-    points: Sequence[tuple[Point, str | None]],
-    extra: Sequence[str],
-    flat: Mapping[str, dict[str, Any]],
-) -> str:
-    """Write one table of all points, with the extra columns in front; returns its digest.
+def _extra_columns(groups: Sequence[Sequence[FinishedPoint]], opening: Sequence[str]) -> list[str]:
+    """Dotted keys, in order, that tell apart groups of points with the same opening values."""
 
-    Each point comes with the digest that its own table must have.
-    """
-    header, seen = None, hashlib.sha256()
-    for point, expected in points:
-        path = point.folder / name
-        if not expected or not path.exists():
-            raise CollateError(f"point {point.identity} has no table {name}: {path}")
-        data = path.read_bytes()
-        if digest(data) != expected:
-            raise CollateError(f"{path} is not as its point wrote it; run the sweep again")
-        first, _, rows = data.partition(b"\n")
-        values = _csv_row([flat[point.identity].get(key, "") for key in extra])
-        if values and rows:
-            rows = values + rows[:-1].replace(b"\n", b"\n" + values) + b"\n"
-        if header is None:
-            header, rows = first, _csv_row(extra) + first + b"\n" + rows
-        elif first != header:
-            raise CollateError(f"the columns of {path} are {first.decode()}, not {header.decode()}")
-        file.write(rows)
-        seen.update(rows)
-    return seen.hexdigest()
+    def varies(key: str, points: Sequence[FinishedPoint]) -> bool:
+        return len({point.config.get(key) for point in points}) > 1
 
-
-def _csv_row(values: Sequence[Any]) -> bytes:
-    """Values as the start of a CSV line, up to and with the comma before the next."""
-    if not values:
-        return b""
-    text = io.StringIO()
-    csv.writer(text, lineterminator=",").writerow(values)
-    return text.getvalue().encode()
-
-
-def _extra_columns(
-    groups: Sequence[Sequence[Point]], measure: str, flat: Mapping[str, dict[str, Any]]
-) -> list[str]:
-    """Dotted keys, in order, that are needed to tell groups of points with equal rows apart."""
-
-    def varies(key: str, group: Sequence[Point]) -> bool:
-        return len({flat[point.identity].get(key) for point in group}) > 1
-
-    keys = dict.fromkeys(key for group in groups for key in flat[group[0].identity])
-    known: list[tuple[Any, ...]] = [
-        tuple(opening_columns(measure, settings_of(group[0])).values()) for group in groups
+    keys = dict.fromkeys(key for group in groups for key in group[0].config)
+    values: list[tuple[Any, ...]] = [
+        tuple(group[0].opening[name] for name in opening) for group in groups
     ]
     extra = []
     several = [group for group in groups if len(group) > 1]
     # A key that varies inside a group is no reason for its rows, unless there is no other.
     for key in sorted(keys, key=lambda key: any(varies(key, group) for group in several)):
-        told: dict[tuple[Any, ...], list[Point]] = {}
-        for values, group in zip(known, groups, strict=True):
-            told.setdefault(values, []).append(group[0])
-        if len(told) == len(groups):
+        alike: dict[tuple[Any, ...], list[FinishedPoint]] = {}
+        for value, group in zip(values, groups, strict=True):
+            alike.setdefault(value, []).append(group[0])
+        if len(alike) == len(groups):
             break
-        if any(varies(key, alike) for alike in told.values()):
+        if any(varies(key, points) for points in alike.values()):
             extra.append(key)
-            known = [
-                (*values, flat[group[0].identity].get(key))
-                for values, group in zip(known, groups, strict=True)
+            values = [
+                (*value, group[0].config.get(key))
+                for value, group in zip(values, groups, strict=True)
             ]
     return extra
 
 
-def _sort_key(values: Mapping[str, Any]) -> list[tuple[int, float, str]]:
-    """Sorts points by their values in turn: nothing, then numbers by size, then words."""
+def _order(point: FinishedPoint) -> tuple[object, ...]:
+    """Sorts points by their opening columns, then by their config."""
+    opening = [_number_or_word(text) for text in point.opening.values()]
+    return _by_size(opening), _by_size(point.config.values()), point.identity
+
+
+def _number_or_word(text: str) -> float | str:
+    """A value of a table; a number if it is spelt like one."""
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    return number if math.isfinite(number) else text
+
+
+def _by_size(values: Iterable[Any]) -> list[tuple[int, float, str]]:
+    """Sorts values in turn: nothing, then numbers by size, then words."""
     return [
         (0, 0.0, "")
         if value is None
         else (1, float(value), "")
         if isinstance(value, int | float)
         else (2, 0.0, str(value))
-        for value in values.values()
+        for value in values
     ]

@@ -50,6 +50,30 @@ class Leftover:
             return False
 
 
+def clean(archive: Archive, *, remove: bool) -> Iterator[str]:
+    """A line for each thing that no study uses; removed if asked for.
+
+    Raises:
+        ArchiveError: some study cannot be read, so nobody knows what it uses.
+    """
+    unused, notes = leftovers(archive)
+    yield from notes
+    total = 0
+    for leftover in unused:
+        size = leftover.size
+        if remove and not leftover.remove():
+            yield f"kept: {leftover.what}: in use now"
+            continue
+        total += size
+        yield f"{'removed' if remove else 'unused'}: {leftover.what} ({size / 1e6:.2f} MB)"
+    if not unused:
+        yield "nothing to clean"
+    elif remove:
+        yield f"{total / 1e6:.1f} MB freed"
+    else:
+        yield f"{len(unused)} things, {total / 1e6:.1f} MB; nothing is removed without --yes"
+
+
 def leftovers(archive: Archive) -> tuple[list[Leftover], list[str]]:
     """All that no study uses, and notes on what is kept although it may be of no use.
 
@@ -61,28 +85,26 @@ def leftovers(archive: Archive) -> tuple[list[Leftover], list[str]]:
     used = {identity for study in archive.studies.values() for identity in study.points}
     for study in archive.studies.values():
         used.update(study.collated.points if study.collated else ())
-    running = {name for name, point in archive.points.items() if point.point.is_running()}
-    found = [
+    points = {identity: facts.point for identity, facts in archive.points.items()}
+    running = {identity for identity, point in points.items() if point.is_running()}
+    unused = [
         Leftover(
-            f"point {name[:12]}, in no study",
+            f"point {identity[:12]}, in no study",
             # Without its record, a point that is half removed does not count as done.
-            (point.point.folder / "record.json", point.point.folder),
-            point.point.folder / ".lock",
+            (point.folder / "record.json", point.folder),
+            point.folder / ".lock",
         )
-        for name, point in archive.points.items()
-        if name not in used | running
+        for identity, point in points.items()
+        if identity not in used | running
     ]
     notes = [f"point {name[:12]} is kept: it is running" for name in sorted(running - used)]
-    records = {
-        name: archive.points[name].point.note("record") if name in archive.points else None
-        for name in used
-    }
-    if running or not all(records.values()):
+    records = [points[name].note("record") if name in points else None for name in sorted(used)]
+    if running or not all(records):
         notes.append("the store is kept: some study is running, or not finished")
     else:
-        found += _unused_entries(archive.results, [record for record in records.values() if record])
-    found += _dead_files(archive.results, {leftover.paths[-1] for leftover in found})
-    return found, notes
+        unused += _unused_entries(archive.results, [record for record in records if record])
+    unused += _dead_files(archive.results, {leftover.paths[-1] for leftover in unused})
+    return unused, notes
 
 
 def _unused_entries(results: Path, records: list[dict[str, Any]]) -> Iterator[Leftover]:
@@ -112,7 +134,7 @@ def _size(path: Path) -> int:
     """Bytes of a file, or of all files in a folder; 0 if it is gone."""
     with suppress(FileNotFoundError):
         inside = path.rglob("*") if path.is_dir() else [path]
-        return sum(each.stat().st_size for each in inside if each.is_file())
+        return sum(file.stat().st_size for file in inside if file.is_file())
     return 0
 
 

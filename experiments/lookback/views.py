@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from experiments.console import job_names, table_lines
-from experiments.lookback.archive import Archive, KeptPoint, count_states, varying
+from experiments.lookback.archive import Archive, Facts, count_states
 from experiments.lookback.freshness import figure_concerns, table_concerns
-from experiments.tracking.points import Point, State
+from experiments.lookback.query import varying
+from experiments.tracking.points import State
 from experiments.tracking.study import Study
 from experiments.tracking.trees import flatten
 
@@ -38,11 +39,11 @@ def point_list(
     """A line for each point of a study, or of all; `states` keeps some of them."""
     if study is None:
         members: dict[str, list[str]] = {name: [] for name in archive.points}
-        for each in archive.studies.values():
-            for name in each.points:
-                members.setdefault(name, []).append(each.name)
-        points = [archive.points.get(n) or KeptPoint(Point(archive.results, n)) for n in members]
-        names = [", ".join(members[point.identity]) or "(no study)" for point in points]
+        for listed in archive.studies.values():
+            for name in listed.points:
+                members.setdefault(name, []).append(listed.name)
+        points = [archive.point(name) for name in members]
+        names = [", ".join(studies) or "(no study)" for studies in members.values()]
     else:
         points = archive.points_of(study)
         names = job_names(list(study.points.values())) if study.points else []
@@ -50,37 +51,36 @@ def point_list(
     which = "study" if study is None else "which"
     rows: list[list[object]] = [["point", "state", *columns, which, "seconds", "started"]]
     for point, name in zip(points, names, strict=True):
-        if not states or point.known_state in states:
-            seconds = point.content.get("seconds", {}).get("total")
-            started = str(point.content.get("started", ""))[:19]
+        if not states or point.state in states:
+            seconds = point.record.get("seconds", {}).get("total")
+            started = str(point.record.get("started", ""))[:19]
             values = [point.summary.get(column) for column in columns]
-            identity, state = point.identity[:_SHORT], point.known_state
-            rows.append([identity, state, *values, name, seconds, started])
+            rows.append([_short(point), point.state, *values, name, seconds, started])
     yield from _without_empty(rows, width)
 
 
-def summary_list(points: Sequence[KeptPoint], width: int | None) -> Iterator[str]:
+def summary_list(points: Sequence[Facts], width: int | None) -> Iterator[str]:
     """A line for each finished point: what its config has of its own, and its summary."""
     # The summary opens with columns that say the same as these keys.
-    said = ("truth.", "dt", "actions", "grid.shape", "transition.samples", "seed")
-    extra = [key for key in varying(points) if not key.startswith(said)]
+    repeated = ("truth.", "dt", "actions", "grid.shape", "transition.samples", "seed")
+    extra = [key for key in varying(points) if not key.startswith(repeated)]
     facts: list[dict[str, object]] = [
         {
-            "state": str(point.known_state),
+            "state": str(point.state),
             **{key: point.config.get(key) for key in extra},
             **{key: _rounded(value) for key, value in point.summary.items()},
         }
         for point in points
     ]
-    keys = dict.fromkeys(key for each in facts for key in each)
-    common = [key for key in keys if len({str(each.get(key)) for each in facts}) == 1]
+    keys = dict.fromkeys(key for row in facts for key in row)
+    common = [key for key in keys if len({str(row.get(key)) for row in facts}) == 1]
     if len(points) > 1:
         keys = dict.fromkeys(key for key in keys if key not in common)
-        yield from _facts({"in all": "", **{key: facts[0].get(key) for key in common}})
+        yield from _fact_lines({"in all": "", **{key: facts[0].get(key) for key in common}})
         yield ""
     rows: list[list[object]] = [["point", *keys]]
-    for point, each in zip(points, facts, strict=True):
-        rows.append([point.identity[:_SHORT], *(each.get(key) for key in keys)])
+    for point, row in zip(points, facts, strict=True):
+        rows.append([_short(point), *(row.get(key) for key in keys)])
     yield from _folded(rows, width)
 
 
@@ -98,22 +98,24 @@ def study_status(archive: Archive, study: Study) -> Iterator[str]:
         yield f"  figure  {name}: {_freshness(concerns)}"
 
 
-def point_facts(point: KeptPoint) -> Iterator[str]:
+def point_facts(facts: Facts) -> Iterator[str]:
     """State, config and record by dotted keys, then the log."""
+    point, record = facts.point, facts.record
     yield f"point    {point.identity}"
-    yield f"state    {point.known_state}"
-    yield f"folder   {point.point.folder}"
-    if point.known_state is State.STALE:
-        was, now = point.content["source"][:_SHORT], point.point.source[:_SHORT]
-        yield f"         source was {was}, is {now}"
-    if failure := point.point.failure():
-        facts = flatten({key: value for key, value in failure.items() if key != "traceback"})
-        yield from ["", "failure", *_facts(facts), *f"{failure.get('traceback')}".splitlines()]
-    if point.content:
-        record = {key: v for key, v in point.content.items() if key not in ("config", "summary")}
-        yield from ["", "config", *_facts(point.config), "", "record", *_facts(flatten(record))]
-        yield from ["", "summary", *_facts(point.summary)]
-    log = point.point.folder / "log.txt"
+    yield f"state    {facts.state}"
+    yield f"folder   {point.folder}"
+    if facts.state is State.STALE:
+        yield f"         source was {record['source'][:_SHORT]}, is {point.source[:_SHORT]}"
+    if failure := point.failure():
+        reasons = flatten({key: value for key, value in failure.items() if key != "traceback"})
+        yield from ["", "failure", *_fact_lines(reasons)]
+        yield from f"{failure.get('traceback')}".splitlines()
+    if record:
+        rest = {key: value for key, value in record.items() if key not in ("config", "summary")}
+        yield from ["", "config", *_fact_lines(facts.config)]
+        yield from ["", "record", *_fact_lines(flatten(rest))]
+        yield from ["", "summary", *_fact_lines(facts.summary)]
+    log = point.folder / "log.txt"
     if log.exists():
         yield from ["", "log", *(f"  {line}" for line in log.read_text().splitlines())]
 
@@ -125,7 +127,7 @@ def study_facts(archive: Archive, study: Study) -> Iterator[str]:
     for overrides in study.points.values():
         for key, _, value in (override.partition("=") for override in overrides):
             values.setdefault(key, {})[value] = None
-    yield from ["", "sweep", *_facts({key: ", ".join(each) for key, each in values.items()})]
+    yield from ["", "sweep", *_fact_lines({key: ", ".join(texts) for key, texts in values.items()})]
     if study.collated:
         collated = study.collated
         facts: dict[str, object] = {
@@ -134,21 +136,21 @@ def study_facts(archive: Archive, study: Study) -> Iterator[str]:
             "dirty": collated.dirty,
             "started": " to ".join(collated.started),
         }
-        yield from ["", "tables from", *_facts(facts), "", "tables"]
-        yield from _facts({name: digest[:_SHORT] for name, digest in collated.tables.items()})
+        yield from ["", "tables from", *_fact_lines(facts), "", "tables"]
+        yield from _fact_lines({name: digest[:_SHORT] for name, digest in collated.tables.items()})
 
 
-def differences(one: KeptPoint, two: KeptPoint, width: int | None) -> Iterator[str]:
+def differences(one: Facts, two: Facts, width: int | None) -> Iterator[str]:
     """Differing facts of two points, side by side."""
     parts: list[tuple[str, Mapping[str, Any], Mapping[str, Any]]] = [
         ("config", one.config, two.config),
-        ("versions and run", _comparable(one.content), _comparable(two.content)),
-        ("tables", one.content.get("files", {}), two.content.get("files", {})),
+        ("versions and run", _comparable(one.record), _comparable(two.record)),
+        ("tables", one.record.get("files", {}), two.record.get("files", {})),
         ("summary", one.summary, two.summary),
     ]
     rows = [
-        ["", one.identity[:_SHORT], two.identity[:_SHORT]],
-        ["state", str(one.known_state), str(two.known_state)],
+        ["", _short(one), _short(two)],
+        ["state", str(one.state), str(two.state)],
     ]
     for title, first, second in parts:
         keys = [k for k in dict.fromkeys((*first, *second)) if first.get(k) != second.get(k)]
@@ -162,8 +164,8 @@ def differences(one: KeptPoint, two: KeptPoint, width: int | None) -> Iterator[s
 
 def _comparable(record: dict[str, Any]) -> dict[str, Any]:
     """What of a record tells how and where a point ran."""
-    own = ("identity", "config", "seed", "summary", "files", "stages")
-    return flatten({key: value for key, value in record.items() if key not in own})
+    result = ("identity", "config", "seed", "summary", "files", "stages")
+    return flatten({key: value for key, value in record.items() if key not in result})
 
 
 def _freshness(concerns: Sequence[str]) -> str:
@@ -171,7 +173,7 @@ def _freshness(concerns: Sequence[str]) -> str:
     return f"not up to date: {'; '.join(concerns)}" if concerns else "up to date"
 
 
-def _facts(facts: Mapping[str, Any]) -> Iterator[str]:
+def _fact_lines(facts: Mapping[str, Any]) -> Iterator[str]:
     """A line for each fact."""
     yield from table_lines([[f"  {key}", _text(value)] for key, value in facts.items()] or [[""]])
 
@@ -183,8 +185,8 @@ def _without_empty(rows: Sequence[Sequence[object]], width: int | None) -> Itera
     filled = [
         any(cell not in (None, "") for cell in column[1:]) for column in zip(*rows, strict=True)
     ]
-    kept = [[cell for cell, keep in zip(row, filled, strict=True) if keep] for row in rows]
-    return table_lines(kept, width)
+    full = [[cell for cell, keep in zip(row, filled, strict=True) if keep] for row in rows]
+    return table_lines(full, width)
 
 
 def _folded(rows: Sequence[Sequence[object]], width: int | None) -> Iterator[str]:
@@ -198,6 +200,11 @@ def _folded(rows: Sequence[Sequence[object]], width: int | None) -> Iterator[str
             continue
         yield from [*([""] if first > 1 else []), *lines]
         first, end = end, len(rows[0])
+
+
+def _short(facts: Facts) -> str:
+    """The beginning of a point's identity."""
+    return facts.point.identity[:_SHORT]
 
 
 def _rounded(value: object) -> object:

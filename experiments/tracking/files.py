@@ -48,7 +48,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
-def csv_bytes(frame: pd.DataFrame) -> bytes:
-    """A table as CSV, floats exact."""
-    text: str = frame.to_csv(index=False, lineterminator="\n")
+def csv_bytes(frame: pd.DataFrame, *, header: bool = True) -> bytes:
+    """A table as CSV, floats exact; without its header, the rows alone."""
+    text: str = frame.to_csv(index=False, header=header, lineterminator="\n")
     return text.encode()

@@ -1,0 +1,87 @@
+"""A finished point as collating sees it: its record, and its tables with every value as spelt."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from experiments.tracking.files import digest
+from experiments.tracking.points import Point
+from experiments.tracking.trees import flatten
+
+LAST_OPENING = "seed"  # the last of the columns that open a point's tables
+
+
+class CollateError(Exception):
+    """Points that cannot stand in one table; the message names them."""
+
+
+@dataclass(frozen=True, eq=False)
+class FinishedPoint:
+    """A point that finished.
+
+    Attributes:
+        identity: its name.
+        folder: where its tables are.
+        record: what it wrote of itself.
+    """
+
+    identity: str
+    folder: Path
+    record: Mapping[str, Any]
+
+    @classmethod
+    def read(cls, point: Point) -> FinishedPoint:
+        """A point by its record; its tables are checked when they are read.
+
+        Raises:
+            CollateError: the point did not finish.
+        """
+        record = point.note("record")
+        if record is None:
+            raise CollateError(f"point {point.identity} is not finished: {point.folder}")
+        return cls(point.identity, point.folder, record)
+
+    @property
+    def tables(self) -> list[str]:
+        """Names of the tables that it wrote."""
+        return [Path(name).stem for name in self.record["files"] if name.endswith(".csv")]
+
+    @cached_property
+    def config(self) -> dict[str, Any]:
+        """Its config by dotted keys."""
+        return flatten(self.record["config"])
+
+    @cached_property
+    def opening(self) -> dict[str, str]:
+        """The columns that open its tables, up to the seed, with its values."""
+        summary = self.table("summary")
+        names = list(summary.columns)
+        names = names[: names.index(LAST_OPENING) + 1]
+        return dict(zip(names, summary[names].iloc[0], strict=True))
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of strings.
+
+        Raises:
+            CollateError: there is none, or it is not as the point wrote it.
+        """
+        path = self.folder / f"{name}.csv"
+        written = self.table_digest(name)
+        if not written or not path.exists():
+            raise CollateError(f"point {self.identity} has no table {path.name}: {path}")
+        data = path.read_bytes()
+        if digest(data) != written:
+            raise CollateError(f"{path} is not as its point wrote it; run the sweep again")
+        # As objects: pandas' own type for strings is slower to read and to write.
+        return pd.read_csv(io.BytesIO(data), dtype=object, keep_default_na=False)
+
+    def table_digest(self, name: str) -> str:
+        """sha256 of a table as the point wrote it; empty if it wrote none."""
+        return str(self.record["files"].get(f"{name}.csv", ""))
