@@ -1,241 +1,260 @@
 """The small tables of examples: which points and which trial they show, and what of them."""
 
-import dataclasses
-import math
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from tiny_point import computed, planned
+from hand_made import hand_made
 
-from experiments.collate import examples
-from experiments.collate.examples import example_tables
-from experiments.collate.settings_of import settings_of
-from experiments.config.settings import GridSettings, Region, Settings, TruthSettings
-from experiments.tracking.points import Point
+from experiments.collate.examples import FIRST, example_tables
+from experiments.collate.finished import CollateError, FinishedPoint
+from experiments.point import tables as point_tables
 from mlci.grids import Grid
+from mlci.spaces import Box, StateSpace
 
-SHAPES = [(12, 8), (24, 12), (30, 30)]
-
-
-def grid_of(settings: Settings, shape: tuple[int, ...]) -> GridSettings:
-    return dataclasses.replace(settings.grid, shape=shape)
-
-
-@pytest.fixture(scope="module")
-def points(settings: Settings, tmp_path_factory: pytest.TempPathFactory) -> list[Point]:
-    """Two time steps in three grids, and another seed in one of them."""
-    results = tmp_path_factory.mktemp("results")
-    more = dataclasses.replace(settings.demonstrations, pairs=20, keep=8)
-    settings = dataclasses.replace(settings, horizon=4.0, demonstrations=more)
-    found = [
-        computed(
-            dataclasses.replace(settings, grid=grid_of(settings, shape), dt=dt, seed=seed), results
-        )
-        for shape in SHAPES
-        for dt in (0.25, 0.5)
-        for seed in ((0, 1) if shape == (24, 12) else (0,))
-    ]
-    return found
+TRIALS = (0, 3, 4, 7, 8, 9, 12)  # of the demonstrations that were kept
+TIMES = np.arange(8) * 0.15
+SPACE = StateSpace(
+    Box(np.array([0.0, -3.0]), np.array([2 * np.pi, 3.0])),
+    periodic=np.array([True, False]),
+    names=("angle", "speed"),
+    units=("rad", "rad/s"),
+)
 
 
-def values(point: Point) -> tuple[tuple[int, ...], float, int]:
-    """Grid, time step and seed of a point."""
-    settings = settings_of(point)
-    return settings.grid.shape, settings.dt, settings.seed
-
-
-def table_of(point: Point, name: str) -> pd.DataFrame:
-    return pd.read_csv(point.folder / f"{name}.csv")
-
-
-def test_example_is_the_point_nearest_to_the_papers(
-    points: list[Point], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(examples, "_PATH_EVERY", 3)  # leaves out the last of 17 samples
-    tables = example_tables(points)
-    (example,) = (p for p in points if values(p) == ((24, 12), 0.25, 0))
-    ranking = tables["example_ranking"]
-    assert set(ranking["point"]) == {example.identity}
-    own = table_of(example, "hypotheses")
-    pd.testing.assert_frame_equal(ranking[list(own.columns)], own)
-    phi = table_of(example, "probabilities")
-    np.testing.assert_array_equal(ranking["unconstrained"], phi["unconstrained"])
-    assert set(ranking["trial"]) == set(phi["trial"])
-    visits = table_of(example, "sampled")
-    visits = visits[visits["trial"] == phi["trial"].iloc[0]]
-    assert tables["example_cells"]["cell"].tolist() == visits["cell"].tolist()
-    assert set(tables["example_moves"]["cell"]) == set(visits["cell"])
-    paths, shown = table_of(example, "paths"), tables["example_paths"]
-    ends = [(path["time"].min(), path["time"].max()) for _, path in paths.groupby("demonstration")]
-    assert ends == [(p["time"].min(), p["time"].max()) for _, p in shown.groupby("demonstration")]
-    assert len(shown) / len(paths) == 7 / 17
-    every = paths.merge(shown, on=["demonstration", "time"], suffixes=("", "_shown"))
-    assert len(every) == len(shown)
-    np.testing.assert_allclose(every["position"], every["position_shown"], atol=5.1e-5)
-
-
-def test_cells_and_moves_have_their_corners(points: list[Point]) -> None:
-    tables = example_tables(points)
-    space = settings_of(points[0]).model.space
-    cells = tables["example_cells"]
-    grid = Grid(space, (24, 12))
-    sides = [[f"{side}_{name}" for name in space.names] for side in ("lower", "upper")]
-    centres = (cells[sides[0]].to_numpy() + cells[sides[1]].to_numpy()) / 2
-    np.testing.assert_array_equal(grid.index(centres), cells["cell"])
-    moves = tables["example_moves"]
-    sides = [[f"successor_{name}" for name in names] for names in sides]
-    centres = (moves[sides[0]].to_numpy() + moves[sides[1]].to_numpy()) / 2
-    np.testing.assert_array_equal(grid.index(centres), moves["successor"])
-
-
-def test_compared_trial_is_feasible_in_all_grids_and_passes_nearest(points: list[Point]) -> None:
-    tables = example_tables(points)
-    visits = tables["compared_cells"]
-    alike = [point for point in points if point.identity in set(visits["point"])]
-    assert [settings_of(point).grid.shape for point in alike] == [SHAPES[0], SHAPES[2]]
-    assert {settings_of(point).seed for point in alike} == {0}
-    assert visits["cells"].unique().tolist() == [
-        math.prod(settings_of(p).grid.shape) for p in alike
-    ]
-    feasible = set.intersection(
-        *(set(t["trial"][t["feasible"]]) for t in (table_of(p, "trials") for p in alike))
+def tables(feasible: Sequence[int] = TRIALS, trial: int | None = 4) -> dict[str, pd.DataFrame]:
+    """What a point writes, with two hypotheses; `trial` is the one of `probabilities`."""
+    hypotheses = pd.DataFrame({"hypothesis": [0, 1], "lower_angle": [0.0, np.pi]})
+    hypotheses = hypotheses.assign(
+        lower_speed=-np.inf, upper_angle=[np.pi, 2 * np.pi], upper_speed=np.inf, rank=[2.0, 1.0]
     )
-    (trial,) = visits["trial"].unique()
-    assert trial in feasible
-    paths = table_of(alike[0], "paths")
-    # The wall is a band of positions: how far a path stays away from its nearer side.
-    gaps = {
-        number: np.maximum(0.6 - path["position"], path["position"] - 1.2).min()
-        for number, path in paths.groupby("demonstration")
-        if number in feasible
+    times, count = np.tile(TIMES, len(TRIALS)), len(TIMES) * len(TRIALS)
+    return {
+        "trials": pd.DataFrame({"trial": TRIALS, "feasible": [t in feasible for t in TRIALS]}),
+        "hypotheses": hypotheses,
+        "first": hypotheses.assign(rank=[1.0, 2.0]),
+        "probabilities": pd.DataFrame(
+            {
+                "trial": [] if trial is None else [trial] * 2,
+                "hypothesis": [] if trial is None else [1, 0],
+                "unconstrained": [] if trial is None else [0.1, 1 / 3],
+                "constrained": [] if trial is None else [0.2, 0.4],
+            }
+        ),
+        "sampled": pd.DataFrame(
+            {
+                "trial": np.repeat(list(feasible), 3),
+                "step": [0, 1, 2] * len(feasible),
+                "cell": [5, 6, 11] * len(feasible),
+            }
+        ),
+        "violations": pd.DataFrame(
+            {
+                "trial": np.repeat(TRIALS, 2),
+                "source": ["demonstration", "sampled"] * len(TRIALS),
+                "hypothesis": [1, 0] * len(TRIALS),
+            }
+        ),
+        "moves": pd.DataFrame({"cell": [5, 6], "action": [0, 1], "successor": [6, 11]}),
+        "paths": pd.DataFrame(
+            {
+                "demonstration": np.repeat(TRIALS, len(TIMES)),
+                "time": times,
+                "angle": np.arange(count) / 7,
+                "speed": -1 / 3,
+            }
+        ),
+        "dimensions": pd.DataFrame(
+            {
+                "name": SPACE.names,
+                "unit": SPACE.units,
+                "lower": SPACE.bounds.lower,
+                "upper": SPACE.bounds.upper,
+                "periodic": SPACE.periodic,
+            }
+        ),
+        "regions": pd.DataFrame({"region": [0], "lower_angle": [0.0], "upper_angle": [1.0]}),
     }
-    assert len(gaps) > 1
-    assert min(gaps, key=lambda number: gaps[number]) == trial
-    assert set(tables["compared_paths"]["demonstration"]) == {trial}
-    violations = tables["compared_violations"]
-    for point in alike:
-        own = table_of(point, "violations")
-        shown = violations[violations["cells"] == math.prod(settings_of(point).grid.shape)]
-        columns = ["trial", "source", "hypothesis"]
-        expected = own[own["trial"] == trial][columns].to_numpy().tolist()
-        assert expected
-        assert shown[columns].to_numpy().tolist() == expected
 
 
-def test_time_step_is_one_at_which_nearly_all_can_be_followed(
-    points: list[Point], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def dts() -> set[float]:
-        return set(example_tables(points)["compared_cells"]["dt"])
-
-    counts = {
-        dt: min(
-            int(table_of(p, "trials")["feasible"].sum())
-            for p in points
-            if settings_of(p).dt == dt and settings_of(p).grid.shape != SHAPES[1]
-        )
-        for dt in (0.25, 0.5)
-    }
-    assert 0 < counts[0.25] < counts[0.5]
-    assert dts() == {0.5}
-    monkeypatch.setattr(examples, "_ENOUGH", 0.0)
-    assert dts() == {0.25}
-    (trial,) = example_tables(points)["compared_cells"]["trial"].unique()
-    for point in points:
-        if settings_of(point).dt == 0.25 and settings_of(point).grid.shape != SHAPES[1]:
-            trials = table_of(point, "trials").set_index("trial")
-            assert trials["feasible"][trial]
+def point(results: Path, feasible: Sequence[int] = TRIALS, **values: Any) -> FinishedPoint:
+    return FinishedPoint.read(hand_made(results, tables(feasible), **values))
 
 
-def test_order_of_points_does_not_matter_and_truths_stand_apart(points: list[Point]) -> None:
-    one, two = example_tables(points), example_tables(points[::-1])
-    for name, table in one.items():
-        pd.testing.assert_frame_equal(table, two[name])
+def examples_of(
+    points: Sequence[FinishedPoint],
+    examples: dict[str, list[dict[str, Any]]],
+    cases: dict[str, str] | None = None,
+) -> tuple[dict[str, pd.DataFrame], list[str]]:
+    """The tables, and what is said of those that are missing."""
+    messages: list[str] = []
+    return example_tables(points, examples, cases or {}, messages.append), messages
 
 
-def test_example_has_the_settings_of_most_points(points: list[Point]) -> None:
-    own, results = settings_of(points[0]), points[0].results
-    cold = computed(dataclasses.replace(own, temperature=0.5), results)
-    often = computed(dataclasses.replace(own, rollouts=2), results)
-    # All are equally near; temperature 0.5 comes first in tables.
-    for order in ([cold, points[0], often], [often, points[0], cold]):
-        assert set(example_tables(order)["example_ranking"]["point"]) == {points[0].identity}
+def identities(table: pd.DataFrame) -> list[str]:
+    return table["point"].unique().tolist()
 
 
-def test_first_are_those_of_the_point_with_the_settings_of_most(points: list[Point]) -> None:
-    def point(dt: float) -> Point:
-        wanted = SHAPES[1], dt, 0
-        (found,) = (p for p in points if values(p) == wanted)
-        return found
-
-    near, usual = point(0.25), point(0.5)
-    most = [p for p in points if settings_of(p).dt == 0.5 or settings_of(p).seed == 1]
-    tables = example_tables([near, *most])
-    assert set(tables["example_ranking"]["point"]) == {near.identity}
-    ranking = tables["first_ranking"]
-    assert ranking.columns[:2].tolist() == ["tasks.crossing", "point"]
-    assert set(ranking["point"]) == {usual.identity}
-    assert set(ranking["tasks.crossing"]) == {False}
-    own = table_of(usual, "first")
-    pd.testing.assert_frame_equal(ranking[list(own.columns)], own)
-    trials = table_of(usual, "trials")["trial"]
-    assert len(trials) > 5
-    first = sorted(trials)[:5]
-    paths = table_of(usual, "paths")
-    paths = paths[paths["demonstration"].isin(first)].reset_index(drop=True)
-    assert paths["demonstration"].unique().tolist() == first
-    found = tables["first_paths"].drop(columns="tasks.crossing")
-    pd.testing.assert_frame_equal(found, paths, check_exact=False, atol=5.1e-5, rtol=0)
-
-
-def test_first_violations_are_those_of_demonstrations_with_corners(points: list[Point]) -> None:
-    tables = example_tables([point for point in points if settings_of(point).dt == 0.5])
-    violations, shown = tables["first_violations"], set(tables["first_ranking"]["point"])
-    (usual,) = (point for point in points if point.identity in shown)
-    own = table_of(usual, "violations")
-    first = sorted(table_of(usual, "trials")["trial"])[:5]
-    of_first = own[own["trial"].isin(first)]
-    assert set(of_first["source"]) == {"demonstration", "sampled"}
-    kept = of_first[of_first["source"] == "demonstration"]
-    assert set(kept["trial"]) == set(first)
-    columns = ["trial", "source", "hypothesis"]
-    assert violations[columns].to_numpy().tolist() == kept[columns].to_numpy().tolist()
-    # Ten hypotheses of 0.6 m from -3 m on.
-    np.testing.assert_allclose(violations["lower_position"], 0.6 * violations["hypothesis"] - 3)
-    np.testing.assert_allclose(violations["upper_position"], 0.6 * violations["hypothesis"] - 2.4)
-    counts = kept.groupby("hypothesis").size()
-    ranking = table_of(usual, "first").set_index("hypothesis")["violating_demonstrations"]
-    assert counts.to_dict() == ranking[ranking > 0].to_dict()
-
-
-def test_each_kind_of_tasks_has_a_first_ranking(points: list[Point]) -> None:
-    settings, results = settings_of(points[0]), points[0].results
-    box = Region((-0.6, -0.2), (0.0, 0.6))  # a mass can pass it on either side
-    plain = dataclasses.replace(settings, truth=TruthSettings("box", (box,), None))
-    tasks = dataclasses.replace(plain.tasks, crossing=True)
-    crossing = dataclasses.replace(plain, tasks=tasks)
-    cold = dataclasses.replace(crossing, temperature=0.5)
-    made = [computed(each, results) for each in (plain, crossing, cold)]
-    kept = [sorted(table_of(point, "trials")["trial"]) for point in made[:2]]
-    assert kept[0] != kept[1]
-    for order in (made, made[::-1]):
-        tables = example_tables(order)
-        parts = [tables[f"first_{name}"] for name in ("ranking", "paths", "violations")]
-        for point, trials, kind in zip(made, kept, (False, True), strict=False):
-            ranking, paths, violations = (part[part["tasks.crossing"] == kind] for part in parts)
-            assert set(ranking["point"]) == {point.identity}
-            assert paths["demonstration"].unique().tolist() == trials[:5]
-            assert set(violations["trial"]) == set(trials[:5])
-
-
-def test_many_truths_have_no_examples(points: list[Point]) -> None:
-    settings = settings_of(points[0])
-    named = [
-        planned(
-            dataclasses.replace(settings, truth=dataclasses.replace(settings.truth, name=name)),
-            points[0].results,
-        )
-        for name in "abcde"
+@pytest.fixture
+def points(tmp_path: Path) -> list[FinishedPoint]:
+    """Two truths, two time steps."""
+    return [
+        point(tmp_path, truth__name=truth, dt=dt) for truth in ("c1", "c2") for dt in (0.25, 0.5)
     ]
-    assert example_tables(named) == {}
+
+
+@pytest.mark.parametrize(
+    ("entry", "places"),
+    [
+        ({}, [0, 2]),
+        ({"dt": 0.5}, [1, 3]),
+        ({"dt": [0.5, 1.0]}, [1, 3]),
+        ({"dt": 0.5, "cells": 12, "actions": 3, "samples": 1, "seed": 0}, [1, 3]),
+        ({"temperature": 1, "tasks.crossing": False}, [0, 2]),
+        ({"truth": "c2"}, [2]),
+        ({"truth": ["c1", "c2"], "dt": 0.5}, [1, 3]),
+        ({"case": "slow"}, [1, 3]),
+    ],
+)
+def test_an_entry_chooses_a_point_a_truth(
+    entry: dict[str, Any], places: list[int], points: list[FinishedPoint]
+) -> None:
+    cases = {points[1].identity: "slow", points[3].identity: "slow"}
+    found, messages = examples_of(points, {"ranking": [entry]}, cases)
+    assert identities(found["example_ranking"]) == [points[i].identity for i in places]
+    assert not messages
+
+
+def test_the_first_entry_with_a_point_counts(points: list[FinishedPoint]) -> None:
+    entries: list[dict[str, Any]] = [{"dt": 2.0}, {"dt": 0.5, "truth": "c2"}, {"dt": 0.25}]
+    found, messages = examples_of(points, {"ranking": entries})
+    assert identities(found["example_ranking"]) == [points[0].identity, points[3].identity]
+    assert not messages
+
+
+@pytest.mark.parametrize(
+    "entry", [{"dt": 2.0}, {"sed": 0}, {"temperature": "warm"}, {"actions": "3x3"}, {"case": "no"}]
+)
+def test_an_example_that_is_missing_is_told(
+    entry: dict[str, Any], points: list[FinishedPoint]
+) -> None:
+    found, messages = examples_of(points, {"ranking": [entry, {"dt": 0.5, "truth": "c2"}]})
+    assert identities(found["example_ranking"]) == [points[3].identity]
+    assert messages == ["examples.ranking: no point of truth c1 is as named, so it shows none"]
+    found, messages = examples_of(points, {"ranking": [entry]})
+    assert not found
+    assert len(messages) == 2
+
+
+def test_an_unknown_kind_is_refused(points: list[FinishedPoint]) -> None:
+    with pytest.raises(CollateError, match="examples: rankings: there are ranking, compared, fir"):
+        examples_of(points, {"rankings": [{}]})
+
+
+def test_ranking_shows_one_trial(points: list[FinishedPoint]) -> None:
+    found, _ = examples_of(points[:1], {"ranking": [{}]})
+    assert set(found) == {
+        f"example_{name}"
+        for name in ("ranking", "paths", "cells", "moves", "regions", "dimensions")
+    }
+    ranking = found["example_ranking"]
+    assert ranking["rank"].tolist() == ["2.0", "1.0"]
+    assert ranking["trial"].tolist() == ["4", "4"]
+    assert ranking["unconstrained"].tolist() == [str(1 / 3), "0.1"]
+    assert ranking["constrained"].tolist() == ["0.4", "0.2"]
+    cells = found["example_cells"]
+    assert cells[["trial", "cell"]].to_numpy().tolist() == [["4", "5"], ["4", "6"], ["4", "11"]]
+    assert found["example_regions"]["upper_angle"].tolist() == ["1.0"]
+    assert found["example_dimensions"]["name"].tolist() == ["angle", "speed"]
+
+
+def test_ranking_without_a_trial_has_no_cells(tmp_path: Path) -> None:
+    lonely = FinishedPoint.read(hand_made(tmp_path, tables(trial=None)))
+    found, messages = examples_of([lonely], {"ranking": [{}]})
+    assert not messages
+    assert not len(found["example_cells"])
+    assert found["example_ranking"]["unconstrained"].isna().all()
+
+
+def test_paths_of_an_example_are_thinned_and_keep_their_ends(points: list[FinishedPoint]) -> None:
+    found, _ = examples_of(points[:1], {"ranking": [{}]})
+    paths = found["example_paths"]
+    assert paths["demonstration"].unique().tolist() == [str(trial) for trial in TRIALS]
+    one = paths[paths["demonstration"] == "3"]
+    assert one["time"].tolist() == [0.0, 0.3, 0.6, 0.9, 1.05]
+    assert one["angle"].tolist() == [round(i / 7, 4) for i in (8, 10, 12, 14, 15)]
+    assert set(one["speed"]) == {-0.3333}
+
+
+@pytest.mark.parametrize("offset", [None, [0.25, 0.0]])
+def test_corners_of_cells_are_those_of_the_grid(offset: list[float] | None, tmp_path: Path) -> None:
+    shifted = point(tmp_path, grid__offset=offset)
+    moves = examples_of([shifted], {"ranking": [{}]})[0]["example_moves"]
+    lower, upper = Grid(SPACE, (4, 3), tuple(offset or ())).corners
+    for prefix, cells in (("", [5, 6]), ("successor_", [6, 11])):
+        for side, corners in (("lower", lower), ("upper", upper)):
+            names = [f"{prefix}{side}_{name}" for name in SPACE.names]
+            np.testing.assert_array_equal(moves[names], corners[cells].round(6))
+
+
+def test_compared_shows_one_trial_in_several_points(tmp_path: Path) -> None:
+    coarse = point(tmp_path, feasible=(0, 4, 7))
+    fine = point(tmp_path, feasible=(3, 4, 7), grid__shape=[6, 4])
+    entry = {"cells": [12, 24]}
+    for trial, shown in ((None, "4"), (7, "7"), ({"wall": 7}, "7"), ({"c1": 7}, "4")):
+        found, messages = examples_of([coarse, fine], {"compared": [{**entry, "trial": trial}]})
+        assert not messages
+        assert identities(found["compared_cells"]) == [coarse.identity, fine.identity]
+        assert found["compared_cells"]["cells"].unique().tolist() == ["12", "24"]
+        assert set(found["compared_cells"]["trial"]) == {shown}
+        assert set(found["compared_paths"]["demonstration"]) == {shown}
+        assert len(found["compared_paths"]) == len(TIMES)
+        violations = found["compared_violations"]
+        assert violations["source"].tolist() == ["demonstration", "sampled"] * 2
+        assert violations["lower_angle"].tolist() == [3.141593, 0.0] * 2
+    # Neither can be followed in both.
+    for trial in (0, 3):
+        found, messages = examples_of([coarse, fine], {"compared": [{**entry, "trial": trial}]})
+        assert not found
+        assert messages == [
+            "examples.compared: no point of truth wall is as named, so it shows none"
+        ]
+
+
+def test_compared_falls_back_where_no_trial_can_be_followed(tmp_path: Path) -> None:
+    coarse = point(tmp_path, feasible=(0, 4))
+    fine = point(tmp_path, feasible=(3, 7), grid__shape=[6, 4])
+    found, _ = examples_of([coarse, fine], {"compared": [{}, {"cells": 24}]})
+    assert identities(found["compared_cells"]) == [fine.identity]
+    assert set(found["compared_cells"]["trial"]) == {"3"}
+
+
+def test_first_shows_the_first_demonstrations_of_each_kind_of_tasks(tmp_path: Path) -> None:
+    both = [point(tmp_path, tasks__crossing=crossing) for crossing in (False, True)]
+    found, messages = examples_of(both[::-1], {"first": [{"seed": 0}]})
+    assert not messages
+    ranking = found["first_ranking"]
+    assert ranking.columns[:2].tolist() == ["tasks.crossing", "point"]
+    assert identities(ranking) == [one.identity for one in both]
+    assert ranking["tasks.crossing"].tolist() == [False, False, True, True]
+    assert ranking["rank"].tolist() == ["1.0", "2.0"] * 2
+    first = ["0", "3", "4", "7", "8"]
+    paths = found["first_paths"]
+    assert paths["demonstration"].unique().tolist() == first
+    assert len(paths) == 2 * 5 * len(TIMES)
+    violations = found["first_violations"]
+    assert violations["trial"].tolist() == first * 2
+    assert set(violations["source"]) == {"demonstration"}
+    assert set(violations["upper_angle"]) == {6.283185}
+    found, messages = examples_of(both, {"first": [{"tasks.crossing": True}]})
+    assert identities(found["first_ranking"]) == [both[1].identity]
+    assert not messages
+
+
+def test_first_demonstrations_are_those_that_points_rank() -> None:
+    assert FIRST == point_tables.FIRST

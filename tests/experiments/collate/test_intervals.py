@@ -55,6 +55,25 @@ def test_one_seed_has_the_interval_of_the_ordinary_bootstrap() -> None:
     assert (row["measure"], row["seeds"], row["demonstrations"]) == ("error", 1, 40)
 
 
+def test_interval_is_of_95_percent_of_the_means_of_resamples() -> None:
+    errors = np.array([3.0, 1.0, 1.0, 8.0, 2.5, 30.0, 4.0])
+    table = measures(trials(errors[:4].tolist(), errors[4:].tolist()))
+    counts = resamples(np.array([4, 3]), ["c1", "400", "9", "0.25", "1"])
+    means = [np.mean(np.repeat(errors, times)) for times in counts]
+    expected = np.quantile(means, [0.025, 0.975])
+    assert table.loc[0, ["low", "high"]].tolist() == pytest.approx(expected.tolist())
+
+
+def test_interval_of_a_share_is_of_the_shares_of_resamples() -> None:
+    rank = [5.0, 6.0, 1.0, 9.0, 2.0, 7.0]  # 5 is among the first 5
+    table = rank_curve(ranks(rank[:3], rank[3:]))
+    counts = resamples(np.array([3, 3]), ["c1", "400", "9", "0.25", "1", "1"])
+    shares = [np.mean(np.repeat(np.array(rank) <= 5, times)) for times in counts]
+    names = ["share_top_5", "share_top_5_low", "share_top_5_high"]
+    expected = [3 / 6, *np.quantile(shares, [0.025, 0.975])]
+    assert table.loc[0, names].tolist() == pytest.approx(expected)
+
+
 def test_both_levels_vary_as_much_as_they_must() -> None:
     """Var* of the mean is (mean over seeds of (m_s - m)^2 + sigma_s^2 / N) / S, exactly."""
     rng = np.random.default_rng(3)
@@ -168,6 +187,18 @@ def test_rows_depend_neither_on_their_order_nor_on_each_other() -> None:
     )
     assert one["mean"] == two["mean"]
     assert one["low"] != two["low"]
+
+
+def test_rows_are_ordered_by_size() -> None:
+    table = pd.concat([ranks([1.0], size=size) for size in (10, 2)])
+    cells = pd.concat([table.assign(cells=cells) for cells in (1600, 400)])
+    found = rank_curve(cells)
+    assert found[["cells", "demonstrations"]].to_numpy().tolist() == [
+        *(["400", 2], ["400", 10]),
+        *(["1600", 2], ["1600", 10]),
+    ]
+    two = trials([1.0]).assign(zeal=1.0, angle=2.0)
+    assert measures(two)["measure"].tolist() == ["error", "zeal", "angle"]
 
 
 def test_opening_columns_stay_as_they_are_spelt(tmp_path: Path) -> None:

@@ -1,266 +1,215 @@
-"""Points on disk, and tables that hold exactly what points wrote."""
+"""Tables of a study hold exactly what points wrote, in an order that is theirs alone."""
 
-import csv
-import dataclasses
-import io
+from __future__ import annotations
+
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from tiny_point import computed, hopeless, planned
+from hand_made import hand_made
 
-from experiments.collate.examples import example_tables
-from experiments.collate.join import CollateError, collate
-from experiments.collate.settings_of import settings_of
-from experiments.config.settings import Settings
-from experiments.point.run import run_point
-from experiments.point.tables import TRUTH_TABLES, table_bytes
-from experiments.tracking.files import csv_bytes, digest
+from experiments.collate.finished import CollateError
+from experiments.collate.join import collate
+from experiments.tracking.files import digest
 from experiments.tracking.points import Point
-from experiments.tracking.store import Store
-from experiments.tracking.study import StudyError, read_study, write_plan
+from experiments.tracking.study import Study, read_study, write_plan
 
 NUMBERS = [1 / 3, 1e-300, 5e-324, -0.1, -0.0, 2**53 + 1.0, np.nextafter(1, 2), np.inf, np.nan]
 
 
-def finished(settings: Settings, results: Path, **changes: object) -> Point:
-    return computed(dataclasses.replace(settings, **changes), results)
+def trials(*errors: float) -> dict[str, pd.DataFrame]:
+    return {"trials": pd.DataFrame({"trial": range(len(errors)), "error": errors})}
 
 
-def rewrite_record(point: Point, **changes: object) -> None:
-    path = point.folder / "record.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+def point_with(results: Path, *errors: float, **values: Any) -> Point:
+    return hand_made(results, trials(*errors) if errors else trials(0.5, 0.25), **values)
 
 
-def joined(name: str, points: Sequence[Point], extra: str = "", values: Sequence[str] = ()) -> str:
-    """The points' own tables one after the other, with columns in front of them."""
-    tables = [(point.folder / name).read_text().splitlines(keepends=True) for point in points]
-    rows = [
-        value + row
-        for table, value in zip(tables, values or [""] * len(tables), strict=True)
-        for row in table[1:]
-    ]
-    assert len(rows) >= len(points)
-    return "".join([extra + tables[0][0], *rows])
+def rows_of(points: Sequence[Point], name: str = "trials") -> list[str]:
+    """The rows of the points' own tables, one point after the other."""
+    texts = [(point.folder / f"{name}.csv").read_text() for point in points]
+    return [row for text in texts for row in text.splitlines()[1:]]
 
 
-def test_finished_point_has_a_record_and_exact_tables(settings: Settings, tmp_path: Path) -> None:
-    point = finished(settings, tmp_path, seed=1)
-    assert point.is_done()
-    table = pd.read_csv(point.folder / "trials.csv")
-    assert list(table.columns[:6]) == ["truth", "cells", "actions", "dt", "samples", "seed"]
-    assert table.iloc[0, :6].tolist() == ["wall", 96, 3, 0.5, 1, 1]
-    lines: list[str] = []
-    by_name = run_point(settings_of(point), Store(tmp_path / "store"), lines.append)
-    assert {path.stem for path in point.folder.glob("*.csv")} == set(by_name)
-    for name, frame in by_name.items():
-        table = pd.read_csv(point.folder / f"{name}.csv")
-        opening = len(TRUTH_TABLES.get(name, settings_of(point).columns))
-        assert list(table.columns[opening:]) == list(frame.columns)
-        for column in frame.columns:
-            np.testing.assert_array_equal(table[column], frame[column])
-    record = json.loads((point.folder / "record.json").read_text())
-    assert record["identity"] == point.folder.name
-    assert record["config"]["grid"] == {"shape": [12, 8], "offset": None}
-    assert record["seconds"]["total"] >= 0
-    assert record["packages"]["numpy"] == np.__version__
-    assert lines
-    assert (point.folder / "log.txt").read_text() == "".join(f"{line}\n" for line in lines)
+def lines(folder: Path, name: str = "trials") -> list[str]:
+    """The lines of a study's table."""
+    return (folder / "tables" / f"{name}.csv").read_text().splitlines()
 
 
-def test_floats_are_exact_in_tables(settings: Settings) -> None:
-    frame = pd.DataFrame({"truth": "other", "trial": range(len(NUMBERS)), "error": NUMBERS})
-    for data, truth in [
-        (csv_bytes(frame), "other"),
-        (table_bytes("trials", frame, settings), "wall"),
-    ]:
-        rows = list(csv.DictReader(io.StringIO(data.decode())))
-        assert [row["truth"] for row in rows] == [truth] * len(NUMBERS)
-        kept = [float(row["error"] or "nan") for row in rows]
-        # As bits: 0.0 is not -0.0 there, and NaN is itself.
-        assert np.array(kept).tobytes() == np.array(NUMBERS).tobytes()
+def study_of(folder: Path) -> Study:
+    study = read_study(folder)
+    assert study is not None
+    return study
 
 
-@pytest.mark.parametrize("harm", ["table", "record", "source", "missing"])
-def test_point_that_is_not_whole_is_not_done(harm: str, settings: Settings, tmp_path: Path) -> None:
-    point = finished(settings, tmp_path)
-    if harm == "table":
-        (point.folder / "trials.csv").write_text("trial\n")
-    elif harm == "record":
-        (point.folder / "record.json").write_text('{"identity"')
-    elif harm == "missing":
-        (point.folder / "trials.csv").unlink()
-    else:
-        rewrite_record(point, source="edited")
-    assert not planned(settings, tmp_path).is_done()
+def test_values_are_copied_as_they_are_spelt(tmp_path: Path) -> None:
+    words = ["a, b", 'say "x"', "", "nan", "NA", "1e-5", "True", "007", " "]
+    table = pd.DataFrame({"trial": range(9), "error": NUMBERS, "word": words})
+    point = hand_made(tmp_path, {"hypotheses": table}, truth__name="a, b")
+    collate([point], tmp_path / "study")
+    written = (tmp_path / "study" / "tables" / "hypotheses.csv").read_bytes()
+    assert written == (point.folder / "hypotheses.csv").read_bytes()
 
 
-def test_point_that_fails_is_not_done_and_keeps_its_traceback(
-    settings: Settings, tmp_path: Path
-) -> None:
-    point = planned(hopeless(settings), tmp_path)
-    with pytest.raises(RuntimeError, match="no demonstration was kept"):
-        computed(hopeless(settings), tmp_path)
-    assert not Point(tmp_path, point.identity).is_done()
-    first, second, *rest = (point.folder / "log.txt").read_text().splitlines()
-    assert first.startswith("demonstrations  0 of 6 kept")
-    assert second.startswith("Traceback")
-    assert rest[-1].startswith("RuntimeError: no demonstration was kept")
-
-
-def test_collate_sorts_by_size_whatever_the_order(settings: Settings, tmp_path: Path) -> None:
-    grids = [dataclasses.replace(settings.grid, shape=shape) for shape in [(16, 12), (12, 8)]]
+def test_rows_are_ordered_by_size_whatever_the_order_of_points(tmp_path: Path) -> None:
     points = [
-        finished(settings, tmp_path, grid=grid, dt=dt) for grid in grids for dt in [1.0, 0.25]
+        point_with(tmp_path, 0.5, -0.25, truth__name=truth, grid__shape=shape, dt=dt)
+        for truth in ("a", "b")
+        for shape in ([4, 3], [10, 10])  # 12 and 100 cells: as words, 100 would come first
+        for dt in (0.25, 0.5, 10.0)
     ]
     collate(points, tmp_path / "one")
-    collate(points[::-1], tmp_path / "two")
-    names = {path.name for path in points[0].folder.glob("*.csv")}
-    written = {path.name for path in (tmp_path / "one" / "tables").iterdir()}
-    made = {*example_tables(points), "measures", "rank_curve"}
-    assert written == names | {f"{name}.csv" for name in made}
-    for name in written:
-        one, two = (tmp_path / study / "tables" / name for study in ["one", "two"])
-        assert one.read_bytes() == two.read_bytes()
-        if name not in names:
-            continue
-        # What depends on the truth alone stands once.
-        rows = points[:1] if Path(name).stem in TRUTH_TABLES else points[::-1]
-        assert one.read_text() == joined(name, rows)
-    table = pd.read_csv(tmp_path / "one" / "tables" / "hypotheses.csv")
-    order = [(96, 0.25), (96, 1.0), (192, 0.25), (192, 1.0)]
-    assert list(zip(table["cells"], table["dt"], strict=True)) == [
-        pair for pair in order for _ in range(10)
-    ]
-    assert table["hypothesis"].tolist() == list(range(10)) * 4
-    assert len(pd.read_csv(tmp_path / "one" / "tables" / "attempts.csv")) == 6
+    collate([*points[5:], *points[:5]][::-1], tmp_path / "two")
+    assert lines(tmp_path / "one")[1:] == rows_of(points)
+    tables = {path.name: path.read_bytes() for path in (tmp_path / "one" / "tables").iterdir()}
+    assert {p.name: p.read_bytes() for p in (tmp_path / "two" / "tables").iterdir()} == tables
+    assert set(tables) == {"summary.csv", "trials.csv", "measures.csv"}
 
 
-def test_collate_adds_columns_that_tell_points_apart(settings: Settings, tmp_path: Path) -> None:
-    flat = dataclasses.replace(settings.grid, shape=(24, 4))
+def test_words_of_a_column_come_after_its_numbers(tmp_path: Path) -> None:
+    points = [point_with(tmp_path, actions=actions) for actions in (5, 15, "3x5")]
+    collate(points[::-1], tmp_path / "study")
+    assert lines(tmp_path / "study")[1:] == rows_of(points)
+
+
+def test_settings_that_the_columns_do_not_tell_become_columns(tmp_path: Path) -> None:
+    flat = {"grid__shape": [6, 2]}
     points = [
-        finished(settings, tmp_path, seed=1),
-        finished(settings, tmp_path, seed=0, grid=flat),
-        finished(settings, tmp_path, seed=0),
+        point_with(tmp_path, seed=0),
+        point_with(tmp_path, seed=0, **flat),
+        point_with(tmp_path, seed=1),
+    ]
+    collate(points[::-1], tmp_path / "study")
+    header, *rows = lines(tmp_path / "study")
+    assert header == "grid.shape,truth,cells,actions,dt,samples,seed,trial,error"
+    shapes = ['"[4, 3]",', '"[6, 2]",', '"[4, 3]",']
+    expected = zip(np.repeat(shapes, 2), rows_of(points), strict=True)
+    assert rows == [f"{shape}{row}" for shape, row in expected]
+
+
+def test_a_setting_that_is_nothing_is_an_empty_value(tmp_path: Path) -> None:
+    points = [point_with(tmp_path), point_with(tmp_path, grid__offset=[0.5, 0.0])]
+    collate(points[::-1], tmp_path / "study")
+    header, *rows = lines(tmp_path / "study")
+    assert header.startswith("grid.offset,truth,")
+    expected = ["", "", '"[0.5, 0.0]"', '"[0.5, 0.0]"']
+    assert rows == [
+        f"{offset},{row}" for offset, row in zip(expected, rows_of(points), strict=True)
+    ]
+
+
+def test_only_the_settings_that_are_needed_become_columns(tmp_path: Path) -> None:
+    points = [point_with(tmp_path, temperature=2.0, tasks__crossing=True), point_with(tmp_path)]
+    collate(points, tmp_path / "study")
+    header, *rows = lines(tmp_path / "study")
+    assert header.startswith("temperature,truth,")
+    assert [row.split(",")[0] for row in rows] == ["1.0", "1.0", "2.0", "2.0"]
+
+
+def attempts(*costs: float) -> dict[str, pd.DataFrame]:
+    return {"attempts": pd.DataFrame({"trial": range(len(costs)), "cost": costs})}
+
+
+def test_a_table_of_the_truth_stands_once_a_seed(tmp_path: Path) -> None:
+    points = [
+        hand_made(tmp_path, attempts(seed + 0.5, 2.0), seed=seed, dt=dt)
+        for seed in (0, 1)
+        for dt in (0.25, 0.5)
+    ]
+    collate(points[::-1], tmp_path / "study")
+    assert lines(tmp_path / "study", "attempts")[0] == "truth,seed,trial,cost"
+    assert lines(tmp_path / "study", "attempts")[1:] == rows_of(points[::2], "attempts")
+
+
+def test_tables_of_the_truth_that_differ_say_by_what(tmp_path: Path) -> None:
+    """A setting that varies among points with the same rows is not the reason for them."""
+    points = [
+        hand_made(tmp_path, attempts(cost), tasks__crossing=crossing, temperature=temperature)
+        for cost, crossing in ((1.0, False), (2.0, True))
+        for temperature in (1.0, 2.0)
     ]
     collate(points, tmp_path / "study")
-    tables = tmp_path / "study" / "tables"
-    ordered = [points[2], points[1], points[0]]
-    values = ['"[12, 8]",', '"[24, 4]",', '"[12, 8]",']
-    for name in ["trials.csv", "ranks.csv", "hypotheses.csv", "summary.csv"]:
-        expected = joined(name, ordered, "grid.shape,", values)
-        assert (tables / name).read_text() == expected
-    table = pd.read_csv(tables / "hypotheses.csv")
-    assert list(table.columns[:2]) == ["grid.shape", "truth"]
-    assert table["grid.shape"].tolist() == ["[12, 8]"] * 10 + ["[24, 4]"] * 10 + ["[12, 8]"] * 10
-    assert table["seed"].tolist() == [0] * 20 + [1] * 10
-    # Both grids have the same attempts, which stand once a seed.
-    attempts = (tables / "attempts.csv").read_text()
-    assert attempts == joined("attempts.csv", ordered[::2])
-    assert pd.read_csv(tables / "attempts.csv")["seed"].tolist() == [0] * 6 + [1] * 6
-    assert (tables / "dimensions.csv").read_text() == joined("dimensions.csv", points[:1])
+    assert lines(tmp_path / "study", "attempts") == [
+        "tasks.crossing,truth,seed,trial,cost",
+        "False,wall,0,0,1.0",
+        "True,wall,0,0,2.0",
+    ]
 
 
-def test_cases_that_are_named_join_the_measures(settings: Settings, tmp_path: Path) -> None:
-    warm, folder = {"temperature": 2.0}, tmp_path / "study"
-    points = [finished(settings, tmp_path, seed=seed) for seed in (0, 1)]
-    points += [finished(settings, tmp_path, seed=seed, **warm) for seed in (0, 1)]
-    names = ["case=default", "case=default", "case='temperature: 2'", "case='temperature: 2'"]
-    collate(points, folder)
-    assert not (folder / "tables" / "cases.csv").exists()
-    words = [[name, "dt=0.5"] for name in names]
-    write_plan(folder, list(zip(points, words, strict=True))[::-1])
-    collate(points[::-1], folder)
-    tables = (folder / "tables" / f"{name}.csv" for name in ("cases", "measures"))
-    cases, measures = (pd.read_csv(table, keep_default_na=False) for table in tables)
-    assert cases["case"].tolist() == ["temperature: 2", "default"]  # as planned
-    assert cases["choice"].tolist() == ["temperature", "default"]
-    assert cases["value"].tolist() == ["2", ""]
-    both = measures.merge(cases, how="left", validate="many_to_one")
-    assert len(both) == len(measures)
-    assert (both["case"] == both["temperature"].map({1: "default", 2: "temperature: 2"})).all()
+def test_a_table_without_rows_keeps_its_header(tmp_path: Path) -> None:
+    regions = pd.DataFrame({"region": [], "lower_angle": []})
+    points = [hand_made(tmp_path, {"regions": regions}, dt=dt) for dt in (0.25, 0.5)]
+    collate(points, tmp_path / "study")
+    assert lines(tmp_path / "study", "regions") == ["truth,region,lower_angle"]
 
 
-def test_collate_refuses_an_unfinished_point(settings: Settings, tmp_path: Path) -> None:
-    done, missing = finished(settings, tmp_path), planned(settings, tmp_path / "elsewhere")
+def test_an_unfinished_point_is_refused(tmp_path: Path) -> None:
+    missing = Point(tmp_path, "f" * 32)
     with pytest.raises(CollateError, match=f"point {missing.identity} is not finished"):
-        collate([done, missing], tmp_path / "study")
+        collate([point_with(tmp_path), missing], tmp_path / "study")
     assert not (tmp_path / "study").exists()
 
 
-def test_collate_refuses_a_mixture_of_sources(settings: Settings, tmp_path: Path) -> None:
-    old, new = (finished(settings, tmp_path, seed=seed) for seed in (0, 1))
-    rewrite_record(old, source="edited")
-    with pytest.raises(CollateError, match="different versions of the source"):
-        collate([old, new], tmp_path / "study")
-
-
-def test_collate_refuses_other_columns(settings: Settings, tmp_path: Path) -> None:
-    one, two = (finished(settings, tmp_path, seed=seed) for seed in (0, 1))
-    record, trials = two.record(), two.folder / "trials.csv"
-    assert record is not None
-    trials.write_bytes(csv_bytes(pd.read_csv(trials).drop(columns="violation_floor")))
-    rewrite_record(two, files=record["files"] | {"trials.csv": digest(trials.read_bytes())})
-    assert two.is_done()
-    with pytest.raises(CollateError, match=r"the columns of .*trials.csv are"):
-        collate([one, two], tmp_path / "study")
-
-
-def test_collate_mixes_sources_when_told_and_lists_them(settings: Settings, tmp_path: Path) -> None:
-    points = [finished(settings, tmp_path, seed=seed) for seed in (0, 1, 2)]
-    rewrite_record(points[2], source="edited")
-    with pytest.raises(CollateError, match=rf"edited: 1 points, such as {points[2].identity}"):
+def test_a_mixture_of_sources_is_refused_unless_it_is_allowed(tmp_path: Path) -> None:
+    points = [point_with(tmp_path, seed=seed) for seed in (0, 1)]
+    points.append(point_with(tmp_path, seed=2, record={"source": "edited"}))
+    with pytest.raises(CollateError, match="different versions of the source") as error:
         collate(points, tmp_path / "study")
+    _, most, least = str(error.value).splitlines()
+    assert most.endswith(f": 2 points, such as {points[0].identity}")
+    assert least == f"  edited: 1 points, such as {points[2].identity}"
+    assert not (tmp_path / "study").exists()
     collate(points, tmp_path / "study", mixed=True)
-    study = read_study(tmp_path / "study")
-    assert study is not None
-    assert study.collated is not None
-    assert sorted(study.collated.sources.values()) == [1, 2]
-    assert study.collated.sources["edited"] == 1
+    collated = study_of(tmp_path / "study").collated
+    assert collated is not None
+    assert dict(collated.sources) == {points[0].source: 2, "edited": 1}
 
 
-def test_refused_collate_leaves_all_old_tables(settings: Settings, tmp_path: Path) -> None:
-    points = [finished(settings, tmp_path, seed=seed) for seed in (0, 1)]
+def test_other_columns_are_refused(tmp_path: Path) -> None:
+    other = pd.DataFrame({"trial": [0], "miss": [0.5]})
+    points = [point_with(tmp_path, seed=0), hand_made(tmp_path, {"trials": other}, seed=1)]
+    with pytest.raises(CollateError, match=r"the columns of .*trials.csv are .*,miss, not .*error"):
+        collate(points, tmp_path / "study")
+
+
+def test_a_missing_table_is_refused(tmp_path: Path) -> None:
+    points = [point_with(tmp_path, seed=0), hand_made(tmp_path, seed=1)]
+    with pytest.raises(CollateError, match=f"point {points[1].identity} has no table trials.csv"):
+        collate(points, tmp_path / "study")
+
+
+def test_a_refusal_leaves_all_old_tables(tmp_path: Path) -> None:
+    points = [point_with(tmp_path, seed=seed) for seed in (0, 1)]
     collate(points[:1], tmp_path / "study")
     before = {path: path.read_bytes() for path in (tmp_path / "study").rglob("*.*")}
-    trials = points[1].folder / "trials.csv"
-    trials.write_bytes(trials.read_bytes().replace(b"wall", b"well", 1))
+    path = points[1].folder / "trials.csv"
+    path.write_bytes(path.read_bytes().replace(b"0.25", b"0.26"))
     with pytest.raises(CollateError, match=r"trials.csv is not as its point wrote it"):
         collate(points, tmp_path / "study")
     assert {path: path.read_bytes() for path in (tmp_path / "study").rglob("*.*")} == before
 
 
-def test_listing_keeps_plan_and_tables_apart(settings: Settings, tmp_path: Path) -> None:
-    points = [finished(settings, tmp_path, seed=seed) for seed in (1, 0)]
+def test_the_study_lists_what_its_tables_came_from(tmp_path: Path) -> None:
+    points = [point_with(tmp_path, seed=seed) for seed in (1, 0)]
     folder = tmp_path / "study"
-    write_plan(folder, [(point, [f"seed={point.config['seed']}"]) for point in points])
-    planned = read_study(folder)
-    assert planned is not None
-    assert planned.points == {points[0].identity: ("seed=1",), points[1].identity: ("seed=0",)}
-    assert planned.collated is None
-    collate(points[::-1], folder)
-    listing = (folder / "study.json").read_bytes()
-    study = read_study(folder)
-    assert study is not None
-    assert study.points == planned.points
+    write_plan(folder, [(point, ["any"]) for point in points])
+    paths = collate(points, folder)
+    study = study_of(folder)
+    assert list(study.points) == [point.identity for point in points]
     assert study.collated is not None
     assert study.collated.points == (points[1].identity, points[0].identity)
-    assert {"measures.csv", "rank_curve.csv", "trials.csv"} < set(study.collated.tables)
-    for name, was in study.collated.tables.items():
-        assert digest((folder / "tables" / name).read_bytes()) == was
-    assert study.collated.started[0] <= study.collated.started[1]
-    # Another sweep that starts, and ends, in the same way.
-    write_plan(folder, [(point, [f"seed={point.config['seed']}"]) for point in points])
-    assert (folder / "study.json").read_bytes() == listing
-    collate(points, folder)
-    assert (folder / "study.json").read_bytes() == listing
+    assert [path.name for path in paths] == sorted(study.collated.tables)
+    for path in paths:
+        assert digest(path.read_bytes()) == study.collated.tables[path.name]
+    assert set(study.collated.tables) == {"measures.csv", "summary.csv", "trials.csv"}
 
 
-def test_a_table_that_is_not_made_any_more_goes(settings: Settings, tmp_path: Path) -> None:
-    point, folder = finished(settings, tmp_path), tmp_path / "study"
+def test_a_table_that_is_not_made_any_more_goes(tmp_path: Path) -> None:
+    point, folder = point_with(tmp_path), tmp_path / "study"
     collate([point], folder)
     listing = json.loads((folder / "study.json").read_text())
     listing["collated"]["tables"]["former.csv"] = "0"
@@ -272,18 +221,14 @@ def test_a_table_that_is_not_made_any_more_goes(settings: Settings, tmp_path: Pa
     assert (folder / "tables" / "mine.csv").exists()
 
 
-def test_listing_that_is_broken_is_told_and_written_anew(
-    settings: Settings, tmp_path: Path
-) -> None:
-    point = finished(settings, tmp_path)
-    path = tmp_path / "study" / "study.json"
-    path.parent.mkdir()
-    for content in ("{", "[]", '{"points": []}', '{"points": {}, "collated": {"points": []}}'):
-        path.write_text(content)
-        with pytest.raises(StudyError, match=r"study.json cannot be read"):
-            read_study(path.parent)
-    collate([point], path.parent)
-    study = read_study(path.parent)
-    assert study is not None
-    assert list(study.points) == [point.identity]
-    assert read_study(tmp_path / "elsewhere") is None
+def test_examples_and_cases_of_the_plan_become_tables(tmp_path: Path) -> None:
+    messages: list[str] = []
+    points = [point_with(tmp_path, seed=seed) for seed in (0, 1)]
+    examples = {"ranking": [{"seed": 7}]}
+    write_plan(tmp_path / "study", [(point, ["case='a: b'"]) for point in points], examples)
+    collate(points, tmp_path / "study", log=messages.append)
+    assert lines(tmp_path / "study", "cases") == [
+        "truth,cells,actions,dt,samples,case,choice,value",
+        "wall,12,3,0.5,1,a: b,a,b",
+    ]
+    assert messages == ["examples.ranking: no point of truth wall is as named, so it shows none"]
