@@ -15,7 +15,7 @@ from typing import Any
 from hydra.core.hydra_config import HydraConfig
 
 from experiments.app import DONE, STOPPED, run_command
-from experiments.collate.join import CollateError
+from experiments.collate.finished import CollateError
 from experiments.config.read import ConfigError
 from experiments.sweep.planner import SweepFailed
 from experiments.sweep.plugins import register_plugins

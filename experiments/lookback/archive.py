@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import re
 from collections import Counter
 from collections.abc import Iterable
@@ -14,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from experiments.config.suggestions import did_you_mean
 from experiments.tracking.points import Point, State
 from experiments.tracking.study import Study, StudyError, read_study
 from experiments.tracking.trees import flatten
@@ -129,7 +129,7 @@ class Archive:
             raise ArchiveError(
                 f"{self.results} holds no results; run a sweep first, or give --results"
             )
-        raise ArchiveError(f"{name}: no such study or point{nearest(name, self._listings)}")
+        raise ArchiveError(f"{name}: no such study or point{did_you_mean(name, self._listings)}")
 
     def study(self, name: str) -> Study:
         """A study by its name.
@@ -139,7 +139,7 @@ class Archive:
         """
         study = self._listings.get(name) or self.find(name)
         if not isinstance(study, Study):
-            raise ArchiveError(f"{name}: no such study{nearest(name, self._listings)}")
+            raise ArchiveError(f"{name}: no such study{did_you_mean(name, self._listings)}")
         return study
 
 
@@ -159,10 +159,3 @@ def value_of(text: str) -> Any:
         return yaml.safe_load(text)
     except yaml.YAMLError:
         return text
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """The end of a message about an unknown word: the nearest known one, or all of them."""
-    known = sorted(known)
-    near = difflib.get_close_matches(word, known, n=1)
-    return f"; did you mean {near[0]}?" if near else f"; known are {', '.join(known)}"

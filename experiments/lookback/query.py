@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.lookback.archive import ArchiveError, Facts, nearest, value_of
+from experiments.config.suggestions import did_you_mean
+from experiments.lookback.archive import ArchiveError, Facts, value_of
 
 _COMPARE: dict[str, Callable[[Any, Any], bool]] = {
     "<=": operator.le,
@@ -79,7 +80,7 @@ def select(points: Iterable[Facts], conditions: Sequence[str]) -> list[Facts]:
             matches.append(point)
     for it in parsed:
         if keys and it.key not in keys:
-            raise ArchiveError(f"{it.key}: no point has this key{nearest(it.key, keys)}")
+            raise ArchiveError(f"{it.key}: no point has this key{did_you_mean(it.key, keys)}")
     return matches
 
 

@@ -193,19 +193,33 @@ def test_a_refusal_leaves_all_old_tables(tmp_path: Path) -> None:
     assert {path: path.read_bytes() for path in (tmp_path / "study").rglob("*.*")} == before
 
 
-def test_the_study_lists_what_its_tables_came_from(tmp_path: Path) -> None:
+def test_the_study_keeps_its_plan_and_lists_what_its_tables_came_from(tmp_path: Path) -> None:
     points = [point_with(tmp_path, seed=seed) for seed in (1, 0)]
-    folder = tmp_path / "study"
-    write_plan(folder, [(point, ["any"]) for point in points])
+    folder, examples = tmp_path / "study", {"ranking": []}
+    plan = [(point, [f"seed={point.config['seed']}"]) for point in points]
+    write_plan(folder, plan, examples)
     paths = collate(points, folder)
-    study = study_of(folder)
-    assert list(study.points) == [point.identity for point in points]
+    listing, study = (folder / "study.json").read_bytes(), study_of(folder)
+    assert study.points == {points[0].identity: ("seed=1",), points[1].identity: ("seed=0",)}
+    assert study.examples == examples
     assert study.collated is not None
     assert study.collated.points == (points[1].identity, points[0].identity)
     assert [path.name for path in paths] == sorted(study.collated.tables)
     for path in paths:
         assert digest(path.read_bytes()) == study.collated.tables[path.name]
     assert set(study.collated.tables) == {"measures.csv", "summary.csv", "trials.csv"}
+    # Another sweep that starts, and ends, in the same way.
+    write_plan(folder, plan, examples)
+    collate(points[::-1], folder)
+    assert (folder / "study.json").read_bytes() == listing
+
+
+def test_a_listing_that_is_broken_is_written_anew(tmp_path: Path) -> None:
+    point, path = point_with(tmp_path), tmp_path / "study" / "study.json"
+    path.parent.mkdir()
+    path.write_text("{")
+    collate([point], path.parent)
+    assert list(study_of(path.parent).points) == [point.identity]
 
 
 def test_a_table_that_is_not_made_any_more_goes(tmp_path: Path) -> None:

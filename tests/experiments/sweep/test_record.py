@@ -1,0 +1,87 @@
+"""What a point leaves: exact tables and a record, or a traceback."""
+
+import csv
+import dataclasses
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from tiny_point import computed, hopeless, planned
+
+from experiments.config.settings import Settings
+from experiments.point.run import run_point
+from experiments.point.tables import TRUTH_TABLES, table_bytes
+from experiments.tracking.files import csv_bytes
+from experiments.tracking.points import Point
+from experiments.tracking.store import Store
+
+NUMBERS = [1 / 3, 1e-300, 5e-324, -0.1, -0.0, 2**53 + 1.0, np.nextafter(1, 2), np.inf, np.nan]
+
+
+def test_finished_point_has_a_record_and_exact_tables(settings: Settings, tmp_path: Path) -> None:
+    settings = dataclasses.replace(settings, seed=1)
+    point = computed(settings, tmp_path)
+    assert point.is_done()
+    table = pd.read_csv(point.folder / "trials.csv")
+    assert list(table.columns[:6]) == ["truth", "cells", "actions", "dt", "samples", "seed"]
+    assert table.iloc[0, :6].tolist() == ["wall", 96, 3, 0.5, 1, 1]
+    lines: list[str] = []
+    by_name = run_point(settings, Store(tmp_path / "store"), lines.append)
+    assert {path.stem for path in point.folder.glob("*.csv")} == set(by_name)
+    for name, frame in by_name.items():
+        table = pd.read_csv(point.folder / f"{name}.csv")
+        opening = len(TRUTH_TABLES.get(name, settings.columns))
+        assert list(table.columns[opening:]) == list(frame.columns)
+        for column in frame.columns:
+            np.testing.assert_array_equal(table[column], frame[column])
+    record = json.loads((point.folder / "record.json").read_text())
+    assert record["identity"] == point.folder.name
+    assert record["config"]["grid"] == {"shape": [12, 8], "offset": None}
+    assert record["seconds"]["total"] >= 0
+    assert record["packages"]["numpy"] == np.__version__
+    assert lines
+    assert (point.folder / "log.txt").read_text() == "".join(f"{line}\n" for line in lines)
+
+
+def test_floats_are_exact_in_tables(settings: Settings) -> None:
+    frame = pd.DataFrame({"truth": "other", "trial": range(len(NUMBERS)), "error": NUMBERS})
+    for data, truth in [
+        (csv_bytes(frame), "other"),
+        (table_bytes("trials", frame, settings), "wall"),
+    ]:
+        rows = list(csv.DictReader(io.StringIO(data.decode())))
+        assert [row["truth"] for row in rows] == [truth] * len(NUMBERS)
+        numbers = [float(row["error"] or "nan") for row in rows]
+        # As bits: 0.0 is not -0.0 there, and NaN is itself.
+        assert np.array(numbers).tobytes() == np.array(NUMBERS).tobytes()
+
+
+@pytest.mark.parametrize("harm", ["table", "record", "source", "missing"])
+def test_point_that_is_not_whole_is_not_done(harm: str, settings: Settings, tmp_path: Path) -> None:
+    point = computed(settings, tmp_path)
+    if harm == "table":
+        (point.folder / "trials.csv").write_text("trial\n")
+    elif harm == "record":
+        (point.folder / "record.json").write_text('{"identity"')
+    elif harm == "missing":
+        (point.folder / "trials.csv").unlink()
+    else:
+        path = point.folder / "record.json"
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"source": "edited"}))
+    assert not planned(settings, tmp_path).is_done()
+
+
+def test_point_that_fails_is_not_done_and_keeps_its_traceback(
+    settings: Settings, tmp_path: Path
+) -> None:
+    point = planned(hopeless(settings), tmp_path)
+    with pytest.raises(RuntimeError, match="no demonstration was kept"):
+        computed(hopeless(settings), tmp_path)
+    assert not Point(tmp_path, point.identity).is_done()
+    first, second, *rest = (point.folder / "log.txt").read_text().splitlines()
+    assert first.startswith("demonstrations  0 of 6 kept")
+    assert second.startswith("Traceback")
+    assert rest[-1].startswith("RuntimeError: no demonstration was kept")
