@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from experiments.lookback.archive import Facts, count_states
+from experiments.tracking import figure_notes
 from experiments.tracking.files import digest
 from experiments.tracking.points import State
 from experiments.tracking.study import Study
-from paper_figures import figure_notes
 
 
 def point_concerns(points: Sequence[Facts]) -> list[str]:
