@@ -201,6 +201,14 @@ def test_rows_are_ordered_by_size() -> None:
     assert measures(two)["measure"].tolist() == ["error", "zeal", "angle"]
 
 
+def test_each_number_of_demonstrations_has_resamples_of_its_own() -> None:
+    rank = np.random.default_rng(6).random(40) * 50
+    one, two = (ranks(rank[:20].tolist(), rank[20:].tolist(), size=size) for size in (1, 2))
+    table = rank_curve(pd.concat([one, two]))
+    assert table["median"].nunique() == 1
+    assert table[["median_low", "median_high"]].drop_duplicates().shape == (2, 2)
+
+
 def test_opening_columns_stay_as_they_are_spelt(tmp_path: Path) -> None:
     for name, table in {"trials": trials([1.0, 2.0]), "ranks": ranks([1.0, 2.0])}.items():
         table.insert(0, "tasks.lower", "[null, -2.0]")

@@ -81,7 +81,6 @@ def test_point_that_fails_is_not_done_and_keeps_its_traceback(
     with pytest.raises(RuntimeError, match="no demonstration was kept"):
         computed(hopeless(settings), tmp_path)
     assert not Point(tmp_path, point.identity).is_done()
-    first, second, *rest = (point.folder / "log.txt").read_text().splitlines()
-    assert first.startswith("demonstrations  0 of 6 kept")
-    assert second.startswith("Traceback")
-    assert rest[-1].startswith("RuntimeError: no demonstration was kept")
+    first, *_, last = (point.folder / "log.txt").read_text().splitlines()
+    assert first.startswith("Traceback")
+    assert last.startswith("RuntimeError: no demonstration was kept")
