@@ -37,6 +37,7 @@ from mlci.tabular import TabularModel, action_grid, discretize
 _MOVES = ("successor", "reward", "allowed")
 _CROSSINGS = ("indices", "indptr")
 
+ESCAPES = "escapes"  # the safe set from constant controls; else it solves the equation (9)
 _MOST_BATCHES = 20  # of tasks, among which enough must cross the truth where only those count
 
 
@@ -87,72 +88,86 @@ class TrialSet:
         return {kind.value: int(np.sum(self.outcome == kind.value)) for kind in Outcome}
 
 
+def safe_set_inputs(settings: Settings) -> tuple[Any, ...]:
+    """All that the safe set depends on, beside code."""
+    method, horizon = settings.safety.method, settings.horizon
+    return (
+        settings.system,
+        _corners(settings.constraint),
+        method,
+        settings.safety.shape,
+        horizon if method == ESCAPES else None,  # the equation's solution is converged
+    )
+
+
 def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
     """Omega of a truth (10), from the store or computed, and its key in the store."""
-    grid = Grid(settings.model.space, settings.safety.shape)
-
-    escapes = settings.safety.method == "escapes"
+    grid, escapes = Grid(settings.model.space, settings.safety.shape), mlci.constant_controls
+    source = escapes if settings.safety.method == ESCAPES else mlci.reachability
 
     def compute() -> dict[str, np.ndarray]:
         system, truth = settings.model, settings.constraint
-        if escapes:
+        if source is escapes:
             safe = tabulate_escapes(system, grid, truth, horizon=settings.horizon)
         else:
             safe = solve_safe_set(system, grid, truth)
         return {"values": safe.values, "gradients": safe.gradients}
 
-    depends: tuple[Any, ...] = (
+    modules = [source, _system_module(settings)]
+    stored = store.get("safe_set", safe_set_inputs(settings), modules, compute)
+    return SafeSet(grid, stored["values"], stored["gradients"]), stored.key
+
+
+def demonstration_inputs(settings: Settings, safe_set_key: str | None) -> tuple[Any, ...]:
+    """All that the trials of a truth depend on, beside code."""
+    demonstrator = settings.demonstrations
+    return (
+        safe_set_key,
         settings.system,
         _corners(settings.constraint),
-        settings.safety.shape,
+        # How many survivors make the study is decided later, and must not make them anew.
+        replace(demonstrator, keep=demonstrator.pairs),
+        settings.tasks,
+        settings.safety,
+        settings.horizon,
+        settings.seed,
     )
-    if escapes:
-        depends = (*depends, settings.horizon)
-    source = mlci.constant_controls if escapes else mlci.reachability
-    stored = store.get("safe_set", depends, [source, _system_module(settings)], compute)
-    return SafeSet(grid, stored["values"], stored["gradients"]), stored.key
 
 
 def demonstrations(settings: Settings, store: Store) -> TrialSet:
     """The trials of a truth (8), from the store or computed."""
-    system, chosen, safety = settings.model, settings.demonstrations, settings.safety
-    omega, omega_key, margin, filter_ = None, None, safety.margin, None
+    system, dt, safety = settings.model, settings.demonstrations.dt, settings.safety
+    omega, omega_key, margin, safety_filter = None, None, safety.margin, None
     if len(settings.constraint):  # where nothing is forbidden, everything is safe
         omega, omega_key = safe_set(settings, store)
-        margin = border_margin(system, omega, chosen.dt) if margin is None else margin
-        filter_ = SafetyFilter(system, omega, chosen.dt, margin, safety.width)
+        margin = border_margin(system, omega, dt) if margin is None else margin
+        safety_filter = SafetyFilter(system, omega, dt, margin, safety.width)
 
     def compute() -> dict[str, np.ndarray]:
+        trials = _trials(settings, omega, margin or 0.0)
         attempts = demonstrate(
-            system,
-            _trials(settings, omega, margin or 0.0),
-            settings.constraint,
-            filter_,
-            **_skill(settings),
+            system, trials, settings.constraint, safety_filter, **_skill(settings)
         )
-        shown = [attempt.demonstration for attempt in attempts]
+        paths = [attempt.demonstration for attempt in attempts]
         return {
             "outcome": np.array([attempt.outcome.value for attempt in attempts]),
-            "starts": np.array([demonstration.task.start for demonstration in shown]),
-            "goal_lower": np.array([demonstration.task.goal.lower for demonstration in shown]),
-            "goal_upper": np.array([demonstration.task.goal.upper for demonstration in shown]),
-            "states": np.array([demonstration.states for demonstration in shown]),
-            "controls": np.array([demonstration.controls for demonstration in shown]),
+            "starts": np.array([path.task.start for path in paths]),
+            "goal_lower": np.array([path.task.goal.lower for path in paths]),
+            "goal_upper": np.array([path.task.goal.upper for path in paths]),
+            "states": np.array([path.states for path in paths]),
+            "controls": np.array([path.controls for path in paths]),
             "cost": np.array([attempt.cost for attempt in attempts]),
             "miss": np.array([attempt.miss for attempt in attempts]),
         }
 
-    # How many survivors make the study is decided later, and must not make them anew.
-    depends = (
-        omega_key,
-        replace(chosen, keep=chosen.pairs),
-        settings.tasks,
-        safety,
-        settings.horizon,
-        settings.seed,
-    )
-    modules = [mlci.demonstrator, mlci.safety_filter, sys.modules[__name__]]
-    return TrialSet(**store.get("demonstrations", depends, modules, compute))
+    modules = [
+        mlci.demonstrator,
+        mlci.safety_filter,
+        _system_module(settings),
+        sys.modules[__name__],
+    ]
+    inputs = demonstration_inputs(settings, omega_key)
+    return TrialSet(**store.get("demonstrations", inputs, modules, compute))
 
 
 def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Trial]:
@@ -161,45 +176,45 @@ def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Tr
     Raises:
         RuntimeError: too few tasks cross the truth, where only those are wanted.
     """
-    system, chosen = settings.model, settings.demonstrations
+    system, demonstrator = settings.model, settings.demonstrations
     draw = partial(
         sample_trials,
         system,
         omega,
         settings.tasks.start_box(system.space),
-        trials=chosen.pairs,
+        trials=demonstrator.pairs,
         seed=settings.seed,
         horizon=settings.horizon,
-        dt=chosen.dt,
+        dt=demonstrator.dt,
         margin=margin,
         goal_offsets=settings.tasks.goal_offsets,
-        restarts=chosen.restarts,
-        hold=chosen.hold,
+        restarts=demonstrator.restarts,
+        hold=demonstrator.hold,
     )
     if not settings.tasks.crossing:
         return draw()
-    found: list[Trial] = []
+    trials: list[Trial] = []
     for batch in range(_MOST_BATCHES):
-        drawn = draw(first=batch * chosen.pairs)
-        found += crossing(system, drawn, settings.constraint, **_skill(settings))
-        if len(found) >= chosen.pairs:
-            return found[: chosen.pairs]
+        drawn = draw(first=batch * demonstrator.pairs)
+        trials += crossing(system, drawn, settings.constraint, **_skill(settings))
+        if len(trials) >= demonstrator.pairs:
+            return trials[: demonstrator.pairs]
     raise RuntimeError(
-        f"of {_MOST_BATCHES * chosen.pairs} tasks only {len(found)} would enter the truth if it "
-        "were not there: widen truth.boxes or tasks, or set tasks.crossing=false"
+        f"of {_MOST_BATCHES * demonstrator.pairs} tasks only {len(trials)} would enter the truth "
+        "if it were not there: widen truth.boxes or tasks, or set tasks.crossing=false"
     )
 
 
 def _skill(settings: Settings) -> dict[str, Any]:
     """What `demonstrate` has to know of a demonstrator, beside tasks, truth and filter."""
-    chosen = settings.demonstrations
+    demonstrator = settings.demonstrations
     return {
-        "dt": chosen.dt,
-        "goal_weight": chosen.goal_weight,
-        "iterations": chosen.iterations,
-        "goal_tolerance": chosen.goal_tolerance,
-        "wind": chosen.wind,
-        "limit": settings.model.control_box if chosen.clip else None,
+        "dt": demonstrator.dt,
+        "goal_weight": demonstrator.goal_weight,
+        "iterations": demonstrator.iterations,
+        "goal_tolerance": demonstrator.goal_tolerance,
+        "wind": demonstrator.wind,
+        "limit": settings.model.control_box if demonstrator.clip else None,
     }
 
 
@@ -227,33 +242,40 @@ def tabular_model(settings: Settings, store: Store) -> TabularModel:
     )
 
 
-def _discretized(
-    settings: Settings, store: Store, stage: str, regions: Regions, wanted: Sequence[str]
-) -> Stored:
-    """Arrays of the tabular MDP with the crossings of some regions, from the store or computed."""
-    counts, samples = settings.action_counts, settings.transition.samples
-
-    def compute() -> dict[str, np.ndarray]:
-        system = settings.model
-        actions = action_grid(system, counts)
-        model = discretize(
-            system, settings.cells, actions, settings.dt, regions, samples, settings.temperature
-        )
-        arrays = {name: getattr(model, name) for name in _MOVES}
-        arrays |= {name: getattr(model.crosses, name) for name in _CROSSINGS}
-        return {name: arrays[name] for name in wanted}
-
-    depends = (
+def model_inputs(settings: Settings, regions: Regions) -> tuple[Any, ...]:
+    """All that the tabular model with the crossings of some regions depends on, beside code."""
+    return (
         settings.system,
         settings.grid,
-        counts,
+        settings.action_counts,
         settings.dt,
-        samples,
+        settings.transition.samples,
         settings.temperature,
         _corners(regions),
     )
+
+
+def _discretized(
+    settings: Settings, store: Store, stage: str, regions: Regions, names: Sequence[str]
+) -> Stored:
+    """Arrays of the tabular model with the crossings of some regions, stored or computed."""
+
+    def compute() -> dict[str, np.ndarray]:
+        model = discretize(
+            settings.model,
+            settings.cells,
+            action_grid(settings.model, settings.action_counts),
+            settings.dt,
+            regions,
+            settings.transition.samples,
+            settings.temperature,
+        )
+        arrays = {name: getattr(model, name) for name in _MOVES}
+        arrays |= {name: getattr(model.crosses, name) for name in _CROSSINGS}
+        return {name: arrays[name] for name in names}
+
     modules = [mlci.tabular, _system_module(settings), sys.modules[__name__]]
-    return store.get(stage, depends, modules, compute)
+    return store.get(stage, model_inputs(settings, regions), modules, compute)
 
 
 def _corners(regions: Regions) -> list[list[str]]:

@@ -1,0 +1,116 @@
+"""A whole point: its tables agree with each other, and its lines tell them."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from tiny_point import composed, hopeless
+
+from experiments.config.read import read_config
+from experiments.config.settings import Settings
+from experiments.point.run import run_point
+from experiments.point.tables import FIRST, PAPER_SIZE, opening_columns, table_bytes
+from experiments.tracking.store import Store
+
+WORDS = ["truth=wall", "horizon=4.0", "dt=0.5", "actions=3", "grid.shape=[16,8]"]
+WORDS += ["safety.shape=[41,21]", "demonstrations.pairs=14", "demonstrations.keep=11"]
+WORDS += ["demonstrations.restarts=1", "demonstrations.dt=0.05", "demonstrations.clip=true"]
+WORDS += ["ranks.demonstrations=10", "ranks.subsets=6", "ranks.top=3", "rollouts=2"]
+
+
+@pytest.fixture(scope="module")
+def point(tmp_path_factory: pytest.TempPathFactory) -> tuple[Settings, dict, list[str]]:
+    settings, lines = read_config(composed(*WORDS))[0], []
+    tables = run_point(settings, Store(tmp_path_factory.mktemp("store")), lines.append)
+    return settings, tables, lines
+
+
+def test_the_summary_is_of_the_other_tables(point: tuple) -> None:
+    _, tables, _ = point
+    (row,) = tables["summary"].to_dict("records")
+    trials, attempts, ranks = (tables[name] for name in ("trials", "attempts", "ranks"))
+    outcomes = attempts["outcome"].value_counts()
+    names = ("truth_entered", "bounds_left", "goal_missed", "kept")
+    assert [row[name] for name in names] == [outcomes.get(name, 0) for name in names]
+    assert row["pairs"] == len(attempts) == 14
+    assert row["demonstrations"] == len(trials) == min(outcomes["kept"], 11)
+    assert row["reachable"] == trials["reachable"].sum()
+    assert row["feasible"] == trials["feasible"].sum()
+    measures = ["final_state_error", "violation_distance", "violation_floor"]
+    for name in (*measures, "violation_distance_pooled"):
+        assert row[name] == pytest.approx(trials[name].mean(), rel=1e-12)
+    after = ranks[ranks["demonstrations"] == PAPER_SIZE]
+    assert row["rank_after_9"] == after["rank"].median()
+    assert row["share_top_3_after_9"] == (after["rank"] <= 3).mean()
+    assert 0 < after["share_top_3"].mean() < 1
+
+
+def test_ranks_are_in_the_top_up_to_the_last_place(point: tuple) -> None:
+    """A rank of exactly `ranks.top` counts."""
+    ranks = point[1]["ranks"]
+    assert (ranks["rank"] == 3).any()
+    np.testing.assert_array_equal(ranks["share_top_3"], (ranks["rank"] <= 3).astype(int))
+
+
+def test_first_are_the_first_five_and_probabilities_those_of_one_trial(point: tuple) -> None:
+    _, tables, _ = point
+    trials, ranking = tables["trials"], tables["hypotheses"]
+    assert len(trials) > FIRST
+    violations = tables["violations"].query("source == 'demonstration'")
+    for name, count in (("hypotheses", len(trials)), ("first", FIRST)):
+        of_these = violations[violations["trial"].isin(trials["trial"][:count])]
+        counts = of_these["hypothesis"].value_counts()
+        expected = [counts.get(i, 0) for i in range(len(ranking))]
+        assert tables[name]["violating_demonstrations"].tolist() == expected
+    example = tables["probabilities"]
+    covered = ranking["covered_by_truth"].to_numpy()
+    feasible = trials[trials["feasible"]]
+    assert example["trial"].nunique() == 1
+    chosen = feasible.set_index("trial").loc[example["trial"].iloc[0]]
+    assert chosen["truth_probability"] == feasible["truth_probability"].max()
+    assert (example["constrained"][covered] == 0).all()
+    assert (example["unconstrained"][covered] > 0).all()
+
+
+def test_lines_tell_counts_diagnosis_ranking_and_measures_in_turn(point: tuple) -> None:
+    _, tables, lines = point
+    (row,) = tables["summary"].to_dict("records")
+    heads = [line.split("  ")[0] for line in lines if not line.startswith(" ")]
+    assert heads == ["demonstrations", "discretisation", "hypotheses", "measures"]
+    assert f"{row['kept']} of 14 kept" in lines[0]
+    assert f"final-state error {row['final_state_error']:.3f}" in "\n".join(lines)
+
+
+def test_rows_are_opened_by_the_point_and_numbers_are_exact(point: tuple, tmp_path: Path) -> None:
+    settings, tables, _ = point
+    assert list(opening_columns("trials", settings)) == [
+        "truth", "cells", "actions", "dt", "samples", "seed",
+    ]  # fmt: skip
+    assert opening_columns("paths", settings) == {"truth": "wall", "seed": 0}
+    assert opening_columns("regions", settings) == {"truth": "wall"}
+    path = tmp_path / "trials.csv"
+    path.write_bytes(table_bytes("trials", tables["trials"], settings))
+    read = pd.read_csv(path)
+    assert read.iloc[0, :6].tolist() == ["wall", 128, 3, 0.5, 1, 0]
+    pd.testing.assert_frame_equal(read.iloc[:, 6:], tables["trials"], check_exact=True)
+    own = pd.DataFrame({"seed": [5], "value": [1.5]})  # a column of the same name gives way
+    assert table_bytes("regions", own, settings) == b"truth,seed,value\nwall,5,1.5\n"
+    assert table_bytes("trials", own, settings).splitlines()[1] == b"wall,128,3,0.5,1,0,1.5"
+
+
+def test_no_demonstration_is_told_with_the_outcomes(settings: Settings, tmp_path: Path) -> None:
+    with pytest.raises(
+        RuntimeError, match=r"no demonstration was kept \(.*6 goal_missed"
+    ):
+        run_point(hopeless(settings), Store(tmp_path), lambda line: None)
+
+
+def test_no_more_demonstrations_than_asked_for(settings: Settings, tmp_path: Path) -> None:
+    for keep in (1, 2):
+        few = dataclasses.replace(settings.demonstrations, keep=keep)
+        one = dataclasses.replace(settings, demonstrations=few)
+        assert len(run_point(one, Store(tmp_path), lambda line: None)["trials"]) == keep

@@ -1,0 +1,118 @@
+"""Every field of a point's settings against the keys of the stages that points share.
+
+A field that is missing in a key makes points share what is not theirs; one too many makes them
+compute again what they could share. Each change below is of one field, and says what it makes anew.
+"""
+
+from __future__ import annotations
+
+import pytest
+from tiny_point import composed
+
+from experiments.config.read import read_config
+from experiments.config.settings import Settings
+from experiments.point import stages
+from experiments.tracking.trees import canonical_json, flatten, plain
+
+BASE = ["grid.shape=[6,5]", "safety.shape=[21,21]"]
+BOX = "[{lower: [3.2, 0.0], upper: [3.8, 1.2]}]"
+ALL = {"safe_set", "demonstrations", "mdp", "mdp_truth"}
+TRUTH, MODEL = {"safe_set", "demonstrations", "mdp_truth"}, {"mdp", "mdp_truth"}
+DEMONSTRATOR: set[str] = {"demonstrations"}
+NOTHING: set[str] = set()
+# A change of each field, and the stages that are made anew by it.
+CHANGES = {
+    "system.target": ("system._target_=mlci.systems.DoubleIntegrator", ALL),
+    "system.arguments.speed_limit": ("system.speed_limit=5.0", ALL),
+    "system.arguments.control_limit": ("system.control_limit=1.5", ALL),
+    "system.arguments.gravity": ("system.gravity=2.0", ALL),
+    "system.arguments.length": ("system.length=2.0", ALL),
+    "actions": ("actions=5", MODEL),
+    "hypotheses.shape": ("hypotheses.shape=[10,20]", {"mdp"}),
+    "hypotheses.boxes": (f"hypotheses.boxes={BOX}", {"mdp"}),
+    "grid.shape": ("grid.shape=[6,7]", MODEL),
+    "grid.offset": ("grid.offset=[0.5,0.0]", MODEL),
+    "dt": ("dt=0.5", MODEL),
+    "transition.samples": ("transition.samples=2", MODEL),
+    "temperature": ("temperature=2.0", MODEL),
+    "inference.prior": ("inference.prior=0.3", NOTHING),  # after Phi
+    "tasks.lower": ("tasks.lower=[null,-1.0]", DEMONSTRATOR),
+    "tasks.upper": ("tasks.upper=[null,1.0]", DEMONSTRATOR),
+    "tasks.goal": ("tasks.goal=[0.1,null]", DEMONSTRATOR),
+    "tasks.crossing": ("tasks.crossing=true", DEMONSTRATOR),
+    "truth.name": ("truth.name=another", NOTHING),  # a word in tables
+    "truth.boxes": ("truth.boxes=[{lower: [3.1, 0.0], upper: [3.9, 1.2]}]", TRUTH),
+    "truth.cell": ("truth=cell truth.cell=37", TRUTH),
+    "horizon": ("horizon=4.0", DEMONSTRATOR),
+    "demonstrations.pairs": ("demonstrations.pairs=90", DEMONSTRATOR),
+    "demonstrations.keep": ("demonstrations.keep=60", NOTHING),  # of those that are stored
+    "demonstrations.dt": ("demonstrations.dt=0.02", DEMONSTRATOR),
+    "demonstrations.goal_tolerance": ("demonstrations.goal_tolerance=0.1", DEMONSTRATOR),
+    "demonstrations.restarts": ("demonstrations.restarts=2", DEMONSTRATOR),
+    "demonstrations.iterations": ("demonstrations.iterations=9", DEMONSTRATOR),
+    "demonstrations.goal_weight": ("demonstrations.goal_weight=200.0", DEMONSTRATOR),
+    "demonstrations.hold": ("demonstrations.hold=0.4", DEMONSTRATOR),
+    "demonstrations.clip": ("demonstrations.clip=true", DEMONSTRATOR),
+    "demonstrations.wind": ("demonstrations.wind=false", DEMONSTRATOR),
+    "safety.method": ("safety.method=escapes", {"safe_set", "demonstrations"}),
+    "safety.shape": ("safety.shape=[23,21]", {"safe_set", "demonstrations"}),
+    "safety.margin": ("safety.margin=0.1", DEMONSTRATOR),
+    "safety.width": ("safety.width=0.1", DEMONSTRATOR),
+    "ranks.demonstrations": ("ranks.demonstrations=10", NOTHING),  # after all stages, as below
+    "ranks.subsets": ("ranks.subsets=10", NOTHING),
+    "ranks.top": ("ranks.top=3", NOTHING),
+    "calibration.sets": ("truth=none calibration.sets=3", TRUTH),  # with another truth, see there
+    "calibration.demonstrations": ("calibration.demonstrations=[1]", NOTHING),
+    "rollouts": ("rollouts=3", NOTHING),
+    "seed": ("seed=1", DEMONSTRATOR),
+}
+
+
+def settings_of(*words: str) -> Settings:
+    return read_config(composed(*BASE, *words))[0]
+
+
+def keys(settings: Settings) -> dict[str, bytes]:
+    """What the key of each stage is made from."""
+    safe_set = canonical_json(stages.safe_set_inputs(settings))
+    return {
+        "safe_set": safe_set,
+        "demonstrations": canonical_json(stages.demonstration_inputs(settings, safe_set.hex())),
+        "mdp": canonical_json(stages.model_inputs(settings, settings.candidates)),
+        "mdp_truth": canonical_json(stages.model_inputs(settings, settings.constraint)),
+    }
+
+
+def test_every_field_has_its_line() -> None:
+    assert set(CHANGES) == set(flatten(plain(settings_of())))
+
+
+@pytest.mark.parametrize("field", CHANGES)
+def test_a_change_makes_anew_what_depends_on_it(field: str) -> None:
+    words, stages_made_anew = CHANGES[field]
+    if field == "system.target":  # two systems with the same arguments
+        one = settings_of("system=double_integrator", "truth=wall", "hypotheses.shape=[10,null]")
+        before = keys(one)
+        tree = plain(one) | {"system": {**plain(one)["system"], "target": "mlci.systems.Another"}}
+        assert canonical_json(tree["system"]) != canonical_json(plain(one)["system"])
+        assert all(canonical_json(plain(one.system)) in before[stage] for stage in ALL)
+        return
+    # Words with spaces are in brackets; others are several overrides.
+    several = [words] if "{" in words or "[" in words else words.split()
+    base, changed = settings_of(), settings_of(*several)
+    flat, other = (flatten(plain(each)) for each in (base, changed))
+    assert flat[field] != other[field]
+    before, after = keys(base), keys(changed)
+    assert {stage for stage in ALL if before[stage] != after[stage]} == stages_made_anew
+
+
+def test_horizon_counts_for_a_safe_set_from_constant_controls() -> None:
+    one, other = (settings_of("safety.method=escapes", f"horizon={h}") for h in (5.0, 4.0))
+    assert keys(one)["safe_set"] != keys(other)["safe_set"]
+
+
+def test_nothing_forbidden_still_depends_on_the_system() -> None:
+    """Where there is no safe set, whose key would tell."""
+    one, other = (settings_of("truth=none", f"system.length={length}") for length in (1.0, 2.0))
+    inputs = [stages.demonstration_inputs(each, None) for each in (one, other)]
+    assert canonical_json(inputs[0]) != canonical_json(inputs[1])
