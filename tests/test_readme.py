@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import os
 import re
@@ -21,6 +22,7 @@ from sybil import Document, Example
 from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.markdown import CodeBlockParser
 
+import mlci
 from mlci.simulate import rollout
 from mlci.systems import Pendulum
 
@@ -193,3 +195,27 @@ def test_every_name_of_the_equation_map_exists_and_is_described() -> None:
         for attribute in attributes:
             value = getattr(value, attribute)
         assert value.__doc__, name
+
+
+def test_the_names_of_the_library_are_listed_once_each() -> None:
+    section = (ROOT / "mlci" / "README.md").read_text().split("## The names")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| (`.*?) \|", section, flags=re.MULTILINE)
+    names = re.findall(r"`(\w+)`", " ".join(rows))
+    assert sorted(names) == sorted(mlci.__all__)
+    assert all(getattr(mlci, name).__doc__ for name in names)
+    assert len(section.splitlines()) < 30
+
+
+def test_the_shortest_way_is_as_short_as_it_says() -> None:
+    """One import, eight statements, and the printed ranking is that of the README."""
+    text = (ROOT / "mlci" / "README.md").read_text()
+    code = re.search(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    shown = re.search(r"```text\n(.*?)```", text, flags=re.DOTALL)
+    assert code is not None
+    assert shown is not None
+    first, *statements = ast.parse(code[1]).body
+    assert isinstance(first, ast.Import)
+    assert len(statements) <= 8
+    names: dict[str, object] = {}
+    exec(code[1], names)
+    assert repr(names["inference"]).split() == shown[1].split()

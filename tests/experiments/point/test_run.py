@@ -102,9 +102,7 @@ def test_rows_are_opened_by_the_point_and_numbers_are_exact(point: tuple, tmp_pa
 
 
 def test_no_demonstration_is_told_with_the_outcomes(settings: Settings, tmp_path: Path) -> None:
-    with pytest.raises(
-        RuntimeError, match=r"no demonstration was kept \(.*6 goal_missed"
-    ):
+    with pytest.raises(RuntimeError, match=r"no demonstration was kept \(.*6 goal_missed"):
         run_point(hopeless(settings), Store(tmp_path), lambda line: None)
 
 
