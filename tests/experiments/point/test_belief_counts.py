@@ -50,7 +50,7 @@ def worlds(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """The table of every world, drawn from the tabular model."""
     store, tables = Store(tmp_path_factory.mktemp("store")), []
     for words in (["truth=none"], *(["truth=cell", f"truth.cell={i}"] for i in range(WORLDS))):
-        settings = tiny(*words)
+        settings = tiny("inference.prior=0.4", *words)
         table = counts(settings, store)
         tables.append(table.assign(truth=settings.columns["truth"], seed=0))
     both = pd.concat(tables, ignore_index=True)
@@ -88,7 +88,9 @@ def test_sets_that_a_truth_cannot_show_are_left_out_and_not_drawn_anew(
         one, three = found[f"cell_{cell}"]
         assert three < one < SETS
     assert (worlds["sets"] == SETS).all()
-    assert worlds.groupby("truth")["prior"].first().sum() == pytest.approx(1)
+    priors = worlds.groupby("truth")["prior"].first()
+    assert priors.pop("none") == 0.4
+    assert priors.tolist() == pytest.approx([0.6 / WORLDS] * WORLDS)
 
 
 def test_beliefs_of_demonstrations_by_hand(tmp_path: Path) -> None:

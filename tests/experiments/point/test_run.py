@@ -15,11 +15,13 @@ from experiments.config.settings import Settings
 from experiments.point.run import run_point
 from experiments.point.tables import FIRST, PAPER_SIZE, opening_columns, table_bytes
 from experiments.tracking.store import Store
+from mlci.evidence import posterior
 
 WORDS = ["truth=wall", "horizon=4.0", "dt=0.5", "actions=3", "grid.shape=[16,8]"]
 WORDS += ["safety.shape=[41,21]", "demonstrations.pairs=14", "demonstrations.keep=11"]
 WORDS += ["demonstrations.restarts=1", "demonstrations.dt=0.05", "demonstrations.clip=true"]
-WORDS += ["ranks.demonstrations=10", "ranks.subsets=6", "ranks.top=3", "rollouts=2"]
+WORDS += ["inference.prior=0.3", "ranks.demonstrations=10", "ranks.subsets=6"]
+WORDS += ["ranks.top=3", "rollouts=2"]
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +75,19 @@ def test_first_are_the_first_five_and_probabilities_those_of_one_trial(point: tu
     assert chosen["truth_probability"] == feasible["truth_probability"].max()
     assert (example["constrained"][covered] == 0).all()
     assert (example["unconstrained"][covered] > 0).all()
+
+
+def test_posterior_has_the_prior_of_the_settings(point: tuple) -> None:
+    for name in ("hypotheses", "first"):
+        ranking = point[1][name]
+        each, _ = posterior(ranking["gain"].to_numpy(), 0.3)
+        np.testing.assert_allclose(ranking["posterior"], each, rtol=1e-12)
+
+
+def test_paths_and_their_times_are_every_fifth_sample(point: tuple) -> None:
+    paths = point[1]["paths"]
+    times = paths["time"][paths["demonstration"] == paths["demonstration"].iloc[0]]
+    np.testing.assert_allclose(times, np.arange(17) * 5 * 0.05)
 
 
 def test_lines_tell_counts_diagnosis_ranking_and_measures_in_turn(point: tuple) -> None:
