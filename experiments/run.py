@@ -21,7 +21,7 @@ from experiments.sweep.planner import SweepFailed
 from experiments.sweep.plugins import register_plugins
 from experiments.sweep.worker import run_single
 
-_SWEEP = ("params", "cases", "case_settings")
+_SWEEP = ("params", "settings", "cases")
 
 
 def main() -> int:

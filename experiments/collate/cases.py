@@ -1,6 +1,6 @@
 """What the points of a study are instances of, in the words of the study's own file.
 
-A case of `hydra.sweeper.cases` may name itself: `case='temperature: 0.5'`, or `case=default`. The
+A case of `hydra.sweeper.cases` has a name, which its points get as `case='temperature: 0.5'`. The
 name changes no result and is no part of a point's identity; it is read from the study's plan.
 """
 

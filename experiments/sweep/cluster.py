@@ -61,7 +61,7 @@ class ClusterLauncher(PoolLauncher):
         Raises:
             ConfigError: the cluster refuses such jobs.
         """
-        trees = {tuple(job): self._tree(tuple(job)) for job in job_overrides}
+        trees = {tuple(job): self.composed[tuple(job)] for job in job_overrides}
         points = {job: read_point(tree)[0] for job, tree in trees.items()}
         attempts_before = {
             job: point.attempts() if trees[job]["sweep"]["force"] else 0

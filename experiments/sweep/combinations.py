@@ -1,27 +1,27 @@
-"""The overrides that make each point of a sweep: all swept values, with each case.
+"""The overrides that make each point of a sweep: swept values, values that go together, cases.
 
 A study's file gives them under `hydra.sweeper`:
 
     params:                     # every combination of these values,
       truth: c1,c2
-    cases:                      # with each of these in turn; the name goes to the table of cases
-      default: []
-      "temperature: 2": [temperature=2.0]
-      "one more cell":          # a list of lists: this case has settings of its own
-        - [dt=0.25, "grid.shape=[10,11]"]
-        - ["dt=0.25,0.5", "grid.shape=[20,21]"]
-    case_settings:              # in which each of the other cases runs
+    settings:                   # with each of these lists of values that go together,
       - [dt=0.25, "grid=100,400,900"]
       - [dt=0.5, grid=400]
+    cases:                      # and in each of them every case; names go to the table of cases
+      default: []
+      "temperature: 2": [temperature=2.0]
+      "one more cell":          # a list of lists stands for this case in settings of its own
+        - [dt=0.25, "grid.shape=[10,11]"]
+        - ["dt=0.25,0.5", "grid.shape=[20,21]"]
 
-Cases without names are a list of lists. Where an override has several values, so has its case.
+Each part may be left out. Where an override has several values, so has its list.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -57,27 +57,23 @@ class Case:
     overrides: tuple[str, ...]
 
 
+@dataclass
 class Combinations:
-    """The combinations of a study.
+    """What a study's file says; what is wrong with it is raised by `overrides`.
 
     Attributes:
-        notes: what a reader has to know of them, once they are listed.
+        params: values that are swept, by key: "1,2,3"; None for no key.
+        settings: lists of overrides; None for a single one without any.
+        cases: names with overrides; None for a single one without a name.
+        ends: of several values take the first and the last only, and note that.
+        notes: what a reader has to know of the combinations, once they are listed.
     """
 
-    def __init__(
-        self, params: Mapping[str, str], cases: object, case_settings: object, ends: bool
-    ) -> None:
-        """Keep what the study's file says; what is wrong with it is raised by `overrides`.
-
-        Args:
-            params: values that are swept, by key: "1,2,3".
-            cases: mapping of names to overrides, or list of overrides; None for a single one.
-            case_settings: list of overrides; None for a single one.
-            ends: of several values take the first and the last only, and note that.
-        """
-        self._params, self._ends = dict(params), ends
-        self._cases, self._case_settings = cases, case_settings
-        self.notes: list[str] = []
+    params: Mapping[str, str] | None = None
+    settings: object = None
+    cases: object = None
+    ends: bool = False
+    notes: list[str] = field(default_factory=list)
 
     def overrides(self, arguments: Sequence[str], parser: OverridesParser) -> list[list[str]]:
         """The overrides of every point, in order.
@@ -89,11 +85,11 @@ class Combinations:
         Raises:
             ConfigError: something cannot be read, or cannot be swept.
         """
-        cases = read_cases(self._cases, self._case_settings)
+        cases = read_cases(self.settings, self.cases)
         typed = parser.parse_overrides(list(arguments))
         typed_keys = {override.key_or_group for override in typed}
         values: dict[str, list[str]] = {}
-        swept = [quote_options(f"{key}={value}") for key, value in self._params.items()]
+        swept = [quote_options(f"{key}={value}") for key, value in (self.params or {}).items()]
         for override in parser.parse_overrides(swept):
             _values(override)  # what cannot be swept is refused even where the command line wins
             if override.key_or_group not in typed_keys:
@@ -116,7 +112,7 @@ class Combinations:
         self, case: Case, parser: OverridesParser, typed_keys: set[str]
     ) -> Iterator[tuple[str, ...]]:
         """The combinations of a case's values, without the keys that the command line gives."""
-        swept_keys = {key.lstrip("+~") for key in self._params}
+        swept_keys = {key.lstrip("+~") for key in self.params or ()}
         values: dict[str, list[str]] = {}
         for word in case.overrides:
             place = f"{case.place}: {word}"
@@ -140,7 +136,7 @@ class Combinations:
     def _study_values(self, override: Override) -> list[str]:
         """What a study gives a key, or the ends of it; notes what the ends stand for."""
         values = _values(override)
-        if self._ends and len(values) > 2:
+        if self.ends and len(values) > 2:
             every = ", ".join(override.sweep_string_iterator())
             first, *_, last = override.sweep_string_iterator()
             key = override.get_key_element()
@@ -149,39 +145,34 @@ class Combinations:
         return values
 
 
-def read_cases(cases: object, case_settings: object) -> list[Case]:
-    """Every case in each of its settings.
+def read_cases(settings: object, cases: object) -> list[Case]:
+    """Every case in each of the settings.
 
     Args:
-        cases: mapping of names to overrides, or list of overrides; None for a single one.
-        case_settings: list of overrides; None for a single one.
+        settings: lists of overrides; None for a single one without any.
+        cases: names with overrides; None for a single one without a name.
 
     Raises:
         ConfigError: something else.
     """
-    settings = _lists(_plain(case_settings) or [[]], "case_settings")
-    cases = _plain(cases) or [[]]
-    read = []
+    place = "hydra.sweeper.cases"
+    shared = _read_lists("hydra.sweeper.settings", _plain(settings) or [[]])
+    cases = _plain(cases)
+    if not cases:
+        return shared
     if not isinstance(cases, dict):
-        for i, words in enumerate(_lists(cases, "cases")):
-            place = f"hydra.sweeper.cases[{i}]"
-            read += [Case(place, (*setting, *words)) for setting in settings]
-        return read
+        raise ConfigError(f"{place}: {cases!r} does not name its cases, as {{default: []}} does")
+    read = []
     for name, content in cases.items():
-        place = f"hydra.sweeper.cases.{name}"
         if isinstance(content, list) and content and isinstance(content[0], list):
-            variants = [tuple(words) for words in _lists(content, f"cases.{name}")]
+            variants = [each.overrides for each in _read_lists(f"{place}.{name}", content)]
         else:
-            (words,) = _lists([content], f"cases.{name}")
-            variants = [(*setting, *words) for setting in settings]
-        read += [Case(place, (_name_override(name), *words)) for words in variants]
+            words = _read_list(f"{place}.{name}", content).overrides
+            variants = [(*each.overrides, *words) for each in shared]
+        quote = '"' if "'" in str(name) else "'"
+        named = f"case={quote}{name}{quote}"
+        read += [Case(f"{place}.{name}", (named, *words)) for words in variants]
     return read
-
-
-def _name_override(name: object) -> str:
-    """The override that gives a case's name to its points."""
-    quote = '"' if "'" in str(name) else "'"
-    return f"case={quote}{name}{quote}"
 
 
 def _plain(value: object) -> Any:
@@ -189,22 +180,19 @@ def _plain(value: object) -> Any:
     return OmegaConf.to_container(value) if OmegaConf.is_config(value) else value
 
 
-def _lists(lists: Any, key: str) -> list[list[str]]:
-    """Lists of overrides, as they are written.
-
-    Raises:
-        ConfigError: they are something else.
-    """
+def _read_lists(place: str, lists: object) -> list[Case]:
+    """Lists of overrides, each with its place."""
     if not isinstance(lists, list):
-        raise ConfigError(f"hydra.sweeper: {key}: {lists!r} is no list of lists of overrides")
-    for i, words in enumerate(lists):
-        if not (isinstance(words, list) and all(isinstance(word, str) for word in words)):
-            place = f"{key}[{i}]" if len(lists) > 1 or not key.startswith("cases.") else key
-            raise ConfigError(
-                f"hydra.sweeper: {place}: {words!r} is no list of overrides, such as "
-                "[dt=0.5, seed=1]"
-            )
-    return lists
+        raise ConfigError(f"{place}: {lists!r} is no list of lists of overrides")
+    return [_read_list(f"{place}[{i}]", words) for i, words in enumerate(lists)]
+
+
+def _read_list(place: str, words: object) -> Case:
+    """A list of overrides."""
+    if not (isinstance(words, list) and all(isinstance(word, str) for word in words)):
+        message = f"{words!r} is no list of overrides, such as [dt=0.5, seed=1]"
+        raise ConfigError(f"{place}: {message}")
+    return Case(place, tuple(words))
 
 
 def _values(override: Override) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -35,17 +35,11 @@ class SweepFailed(Exception):
 class Planner(Sweeper):
     """All combinations of the swept values, each with every case, as one batch for any launcher.
 
-    What `params`, `cases`, `case_settings` and `ends` mean is in `sweep.combinations`.
+    What a study's file says to it is in `sweep.combinations`.
     """
 
-    def __init__(
-        self,
-        params: Mapping[str, str] | None = None,
-        cases: object = None,
-        case_settings: object = None,
-        ends: bool = False,
-    ) -> None:
-        self._combinations = Combinations(params or {}, cases, case_settings, ends)
+    def __init__(self, **study: Any) -> None:
+        self._combinations = Combinations(**study)
 
     def setup(
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
@@ -65,12 +59,14 @@ class Planner(Sweeper):
         """
         parser = OverridesParser.create(config_loader=self._loader)
         jobs = self._combinations.overrides(arguments, parser)
-        for note in self._combinations.notes:
-            print(note)
         plan, study = self._plan(jobs)
         options, folder = study.sweep, results_folder(study) / study.study
         selection = select_points(plan, options)
         print(f"{len(plan)} points: {count_states(plan)}; {len(selection)} to run", flush=True)
+        if len(plan) < len(jobs):
+            print(f"{len(jobs) - len(plan)} of {len(jobs)} combinations repeat others")
+        for note in self._combinations.notes:
+            print(note, flush=True)
         if options.dry_run:
             _print_plan(plan, selection)
             return
@@ -108,8 +104,6 @@ class Planner(Sweeper):
                 trees[tuple(job)] = tree
         if problems:
             raise ConfigError(describe_problems(problems, len(jobs)))
-        if len(plan) < len(jobs):
-            print(f"{len(jobs) - len(plan)} of {len(jobs)} combinations repeat others")
         if isinstance(self._launcher, PoolLauncher):
             self._launcher.names = {planned.job: planned.name for planned in plan.values()}
             self._launcher.composed = trees  # composing costs 0.1 s a point

@@ -12,7 +12,7 @@ from experiments.sweep.planner import Planner
 from experiments.sweep.pool import PoolLauncher
 from experiments.sweep.slurm import SlurmLauncher
 
-_PLANNER = {"params": None, "cases": None, "case_settings": None, "ends": False}
+_PLANNER = {"params": None, "settings": None, "cases": None, "ends": False}
 
 _SLURM = {
     "jobs": 100,  # of the array; the points are dealt to them

@@ -21,7 +21,6 @@ from omegaconf import DictConfig, OmegaConf
 from pebble import ProcessExpired, ProcessPool
 from tqdm import tqdm
 
-from experiments.config.read import plain_tree
 from experiments.sweep.plan import Job
 
 _BAR = "{percentage:3.0f}%|{bar:20}| {n}/{total} points, {elapsed} gone, {remaining} left{postfix}"
@@ -35,7 +34,7 @@ class PoolLauncher(Launcher):
         workers: number of processes; None for one a core.
         fail_fast: start no job after one has failed.
         names: what the sweeper calls jobs, by their overrides.
-        composed: configs that the sweeper has composed already, by their overrides.
+        composed: configs that the sweeper has composed, by their overrides.
     """
 
     def __init__(self, workers: int | None, fail_fast: bool) -> None:
@@ -47,7 +46,7 @@ class PoolLauncher(Launcher):
     def setup(
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
     ) -> None:
-        self.context, self.task, self.config = hydra_context, task_function, config
+        self.task = task_function
 
     def launch(
         self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
@@ -74,7 +73,7 @@ class PoolLauncher(Launcher):
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 for job in islice(waiting, self.workers):
-                    running[pool.schedule(_work, [self.task, self._tree(job)])] = job
+                    running[pool.schedule(_work, [self.task, self.composed[job]])] = job
             finally:
                 signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
             while running:
@@ -96,7 +95,7 @@ class PoolLauncher(Launcher):
                         print(f"[{ended}/{len(jobs)}] {self._name(job)}: {end}", flush=True)
                     if not (self.fail_fast and failures):
                         for job in islice(waiting, 1):
-                            running[pool.schedule(_work, [self.task, self._tree(job)])] = job
+                            running[pool.schedule(_work, [self.task, self.composed[job]])] = job
             self._update(bar, failures, [])
         finally:
             pool.stop()
@@ -115,12 +114,6 @@ class PoolLauncher(Launcher):
     def _name(self, job: Job) -> str:
         """What tells a job from the others."""
         return self.names.get(job) or " ".join(job)
-
-    def _tree(self, job: Job) -> dict[str, Any]:
-        """The resolved config of a job."""
-        if job in self.composed:
-            return self.composed[job]
-        return plain_tree(self.context.config_loader.load_sweep_config(self.config, list(job)))
 
 
 def end_process_when(needless: Callable[[], bool]) -> None:

@@ -130,22 +130,14 @@ def read_study(folder: Path) -> Study | None:
     try:
         tree: dict[str, Any] = json.loads(path.read_bytes())
         points = {name: tuple(overrides) for name, overrides in tree["points"].items()}
-        found = tree["collated"]
-        collated = found and Collated(
-            tuple(found["points"]),
-            dict(found["sources"]),
-            tuple(found["commits"]),
-            bool(found["dirty"]),
-            (found["started"][0], found["started"][1]),
-            float(found["seconds"]),
-            int(found["peak_memory_mb"]),
-            tuple(found["machines"]),
-            tuple(found["versions"]),
-            dict(found["tables"]),
-        )
+        lists: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value
+            for name, value in (tree["collated"] or {}).items()
+        }
+        collated = Collated(**lists) if lists else None
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         raise StudyError(
             f"{path} cannot be read as a study; the study's own command writes it anew"
         ) from None

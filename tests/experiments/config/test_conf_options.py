@@ -96,7 +96,7 @@ def test_every_experiment_is_valid_and_small_at_smoke_scale(
     sweeper = composed(experiment).hydra.sweeper
     axes = sweeper.params or {}
     points, parser = 0, OverridesParser.create()
-    for case in read_cases(sweeper.cases, sweeper.case_settings):
+    for case in read_cases(sweeper.settings, sweeper.cases):
         of_case = parser.parse_overrides([quote_options(word) for word in case.overrides])
         swept = [list(word.sweep_iterator()) for word in of_case if word.is_sweep_override()]
         points += math.prod(min(len(values), 2) for values in swept)

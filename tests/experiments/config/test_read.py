@@ -116,7 +116,7 @@ def test_every_setting_changes_identity() -> None:
     )
 
 
-CASES = "hydra.sweeper.cases="
+SETTINGS = "hydra.sweeper.settings="
 WRONG = [
     ("dtt=0.2", "dtt: unknown key; did you mean dt?"),
     ("+dtt=0.2", "dtt: unknown key; did you mean dt?"),
@@ -309,20 +309,29 @@ def test_all_wrong_points_of_a_sweep_are_reported_at_once(
         (["-m", "study=a,b"], "study=a,b: this changes no result"),
         (["-m", "dt=interval(0,1)"], "dt=interval(0,1): cannot be swept; list its values"),
         (["experiment=paper", "hydra.mode=RUN"], "experiment: this one describes a sweep; add -m"),
-        ([f"{CASES}[[]]"], "experiment: this one describes a sweep; add -m"),
-        (["-m", f"{CASES}3"], "hydra.sweeper: cases: 3 is no list of lists of overrides"),
-        (["-m", f"{CASES}[[],seed]"], "hydra.sweeper: cases[1]: 'seed' is no list of overrides, s"),
-        (["-m", f"{CASES}[[3]]"], "hydra.sweeper: cases[0]: [3] is no list of overrides, such as"),
-        (["-m", f"{CASES}[[],[seed]]"], "sweeper.cases[1]: seed cannot be read as key=value"),
-        (["-m", f"{CASES}[['dt=interval(0,1)']]"], "dt=interval(0,1): cannot be swept; list its"),
-        (["-m", f"{CASES}[['study=x']]"], "cases[0]: study=x: this changes no result, so give"),
-        (["-m", f"{CASES}[['seed=1','seed=2']]"], "cases[0]: seed=2 is the second value of seed"),
+        ([f"{SETTINGS}[[]]"], "experiment: this one describes a sweep; add -m"),
+        (["-m", f"{SETTINGS}3"], "sweeper.settings: 3 is no list of lists of overrides"),
+        (["-m", f"{SETTINGS}[[],seed]"], "sweeper.settings[1]: 'seed' is no list of overrides, s"),
+        (["-m", f"{SETTINGS}[[3]]"], "sweeper.settings[0]: [3] is no list of overrides, such as"),
+        (["-m", f"{SETTINGS}[[],[seed]]"], "sweeper.settings[1]: seed cannot be read as key=value"),
         (
-            ["-m", "experiment=paper", f"{CASES}[[],['dt=0.5']]"],
-            "hydra.sweeper.cases[1]: dt=0.5: params sweep dt too; leave it to one of them",
+            ["-m", f"{SETTINGS}[['dt=interval(0,1)']]"],
+            "dt=interval(0,1): cannot be swept; list its",
         ),
         (
-            ["-m", "dt=0.5,1.0", f"{CASES}[[],['sed=1']]"],
+            ["-m", f"{SETTINGS}[['study=x']]"],
+            "settings[0]: study=x: this changes no result, so give",
+        ),
+        (
+            ["-m", f"{SETTINGS}[['seed=1','seed=2']]"],
+            "settings[0]: seed=2 is the second value of seed",
+        ),
+        (
+            ["-m", "experiment=paper", f"{SETTINGS}[[],['dt=0.5']]"],
+            "hydra.sweeper.settings[1]: dt=0.5: params sweep dt too; leave it to one of them",
+        ),
+        (
+            ["-m", "dt=0.5,1.0", f"{SETTINGS}[[],['sed=1']]"],
             "sed: unknown key; did you mean seed? [2 of 4 points, such as dt=0.5 sed=1]",
         ),
     ],

@@ -192,6 +192,15 @@ def test_old_record_is_gone_before_a_new_attempt_computes(
     assert (note["attempt"], note["pid"]) == (2, os.getpid())
 
 
+def test_worker_runs_a_finished_point_again_only_if_forced(
+    point: Point, settings: Settings, quick: Callable[..., None]
+) -> None:
+    quick()
+    for force, attempts in ((False, 1), (False, 1), (True, 2)):
+        assert attempt.run_in_worker(point, settings, force=force) is State.DONE
+        assert point.attempts() == attempts
+
+
 def test_lock_is_free_after_a_failure(
     point: Point, settings: Settings, quick: Callable[..., None]
 ) -> None:

@@ -13,17 +13,16 @@ from experiments.sweep.combinations import Case, Combinations, read_cases
 def listed(
     *arguments: str,
     params: dict[str, str] | None = None,
+    settings: Any = None,
     cases: Any = None,
-    case_settings: Any = None,
     ends: bool = False,
 ) -> list[str]:
     """The overrides of every point, each point's as one text; then the notes."""
-    combinations = Combinations(
-        params or {},
-        OmegaConf.create(cases) if isinstance(cases, dict | list) else cases,
-        None if case_settings is None else OmegaConf.create(case_settings),
-        ends,
-    )
+    lists = [
+        OmegaConf.create(part) if isinstance(part, dict | list) else part
+        for part in (settings, cases)
+    ]
+    combinations = Combinations(params, *lists, ends)
     jobs = combinations.overrides(arguments, OverridesParser.create())
     return [" ".join(job) for job in jobs] + combinations.notes
 
@@ -33,8 +32,8 @@ def test_study_without_values_has_one_point() -> None:
     assert listed("seed=3") == ["seed=3"]
 
 
-def test_later_values_change_faster_and_cases_fastest() -> None:
-    points = listed("seed=0,1", params={"dt": "0.5,1"}, cases=[["actions=3"], []])
+def test_later_values_change_faster_and_settings_fastest() -> None:
+    points = listed("seed=0,1", params={"dt": "0.5,1"}, settings=[["actions=3"], []])
     assert points == [
         f"dt={dt} seed={seed}{case}"
         for dt in ("0.5", "1")
@@ -62,24 +61,24 @@ SETTINGS = [["dt=0.25", "grid=100,400"], ["dt=0.5"]]
 
 
 def test_each_case_runs_in_each_of_the_settings() -> None:
-    points = [f"{settings}{words}" for words in (" seed=1", " seed=2")
-              for settings in ("dt=0.25 grid='100'", "dt=0.25 grid='400'", "dt=0.5")]  # fmt: skip
-    assert listed(cases=[["seed=1"], ["seed=2"]], case_settings=SETTINGS) == points
-    named = listed(cases={"a": ["seed=1"], "b": ["seed=2"]}, case_settings=SETTINGS)
-    assert named == [f"case='{'ab'[i // 3]}' {point}" for i, point in enumerate(points)]
-    assert listed(case_settings=SETTINGS) == [point[:-7] for point in points[:3]]
+    settings = ["dt=0.25 grid='100'", "dt=0.25 grid='400'", "dt=0.5"]
+    assert listed(settings=SETTINGS) == settings
+    assert listed(settings=SETTINGS, cases={"a": ["seed=1"], "b": ["seed=2"]}) == [
+        f"case='{name}' {words} seed={seed}" for name, seed in (("a", 1), ("b", 2))
+        for words in settings
+    ]  # fmt: skip
 
 
 def test_case_may_have_settings_of_its_own() -> None:
     cases = {"a": [], "b": [["dt=1.0", "seed=1"], ["dt=2.0,3.0"]]}
-    assert listed(cases=cases, case_settings=[["dt=0.5"]]) == [
+    assert listed(cases=cases, settings=[["dt=0.5"]]) == [
         "case='a' dt=0.5",
         *("case='b' dt=1.0 seed=1", "case='b' dt=2.0", "case='b' dt=3.0"),
     ]
 
 
 def test_command_line_wins_over_each_key_of_a_study() -> None:
-    study = {"params": {"truth": "c1,c2"}, "cases": {"a": ["seed=1"]}, "case_settings": SETTINGS}
+    study = {"params": {"truth": "c1,c2"}, "cases": {"a": ["seed=1"]}, "settings": SETTINGS}
     assert listed("seed=4", "truth=wall", **study) == [
         f"seed=4 truth=wall case='a' {setting}"
         for setting in ("dt=0.25 grid='100'", "dt=0.25 grid='400'", "dt=0.5")
@@ -102,17 +101,18 @@ def test_ends_stand_for_all_values_of_a_study_and_say_so() -> None:
 @pytest.mark.parametrize(
     ("study", "message"),
     [
-        ({"cases": 3}, "hydra.sweeper: cases: 3 is no list of lists of overrides"),
-        ({"cases": [[], "seed"]}, "hydra.sweeper: cases[1]: 'seed' is no list of overrides, such"),
-        ({"cases": [[3]]}, "hydra.sweeper: cases[0]: [3] is no list of overrides, such as"),
-        ({"cases": {"a": "seed=1"}}, "hydra.sweeper: cases.a: 'seed=1' is no list of overrides"),
-        ({"cases": {"a": None}}, "hydra.sweeper: cases.a: None is no list of overrides"),
-        ({"cases": {"a": [["seed=1"], 3]}}, "hydra.sweeper: cases.a[1]: 3 is no list of overrides"),
-        ({"case_settings": {"a": []}}, "hydra.sweeper: case_settings: {'a': []} is no list of"),
-        ({"case_settings": ["dt=1"]}, "hydra.sweeper: case_settings[0]: 'dt=1' is no list of over"),
+        ({"settings": 3}, "hydra.sweeper.settings: 3 is no list of lists of overrides"),
+        ({"settings": {"a": []}}, "hydra.sweeper.settings: {'a': []} is no list of lists"),
+        ({"settings": [[], "seed"]}, "hydra.sweeper.settings[1]: 'seed' is no list of overrides"),
+        ({"settings": [[3]]}, "hydra.sweeper.settings[0]: [3] is no list of overrides, such as"),
+        ({"cases": 3}, "hydra.sweeper.cases: 3 does not name its cases, as {default: []} does"),
+        ({"cases": [["seed=1"]]}, "hydra.sweeper.cases: [['seed=1']] does not name its cases"),
+        ({"cases": {"a": "seed=1"}}, "hydra.sweeper.cases.a: 'seed=1' is no list of overrides"),
+        ({"cases": {"a": None}}, "hydra.sweeper.cases.a: None is no list of overrides"),
+        ({"cases": {"a": [["seed=1"], 3]}}, "hydra.sweeper.cases.a[1]: 3 is no list of overrides"),
         ({"cases": {"a": ["seed"]}}, "hydra.sweeper.cases.a: seed cannot be read as key=value"),
         (
-            {"cases": {"a: 1": ["dt=1"]}, "case_settings": [["dt=2"]]},
+            {"cases": {"a: 1": ["dt=1"]}, "settings": [["dt=2"]]},
             "hydra.sweeper.cases.a: 1: dt=1 is the second value of dt in this case; keep one, or",
         ),
         (
@@ -120,8 +120,8 @@ def test_ends_stand_for_all_values_of_a_study_and_say_so() -> None:
             "hydra.sweeper.cases.a: case=b is the second value of case in this case; keep one",
         ),
         (
-            {"params": {"dt": "1,2"}, "case_settings": [["dt=2"]]},
-            "hydra.sweeper.cases[0]: dt=2: params sweep dt too; leave it to one of them",
+            {"params": {"dt": "1,2"}, "settings": [["dt=2"]]},
+            "hydra.sweeper.settings[0]: dt=2: params sweep dt too; leave it to one of them",
         ),
         ({"cases": {"a": ["study=x"]}}, "hydra.sweeper.cases.a: study=x: this changes no result"),
         ({"params": {"study": "a,b"}}, "study=a,b: this changes no result, so give it one value"),
@@ -135,8 +135,8 @@ def test_wrong_study_is_refused_with_its_place(study: dict[str, Any], message: s
 
 
 def test_cases_are_read_with_their_places() -> None:
-    assert read_cases(None, None) == [Case("hydra.sweeper.cases[0]", ())]
-    assert read_cases({"a": ["x=1"]}, [["y=1"], ["y=2"]]) == [
+    assert read_cases(None, None) == [Case("hydra.sweeper.settings[0]", ())]
+    assert read_cases([["y=1"], ["y=2"]], {"a": ["x=1"]}) == [
         Case("hydra.sweeper.cases.a", ("case='a'", "y=1", "x=1")),
         Case("hydra.sweeper.cases.a", ("case='a'", "y=2", "x=1")),
     ]

@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import io
 import json
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from tiny_point import computed, hopeless, planned
 from experiments.config.settings import Settings
 from experiments.point.run import run_point
 from experiments.point.tables import TRUTH_TABLES, table_bytes
+from experiments.sweep.record import write_failure, write_note
 from experiments.tracking.files import csv_bytes
 from experiments.tracking.points import Point
 from experiments.tracking.store import Store
@@ -83,4 +85,33 @@ def test_point_that_fails_is_not_done_and_keeps_its_traceback(
     assert not Point(tmp_path, point.identity).is_done()
     first, *_, last = (point.folder / "log.txt").read_text().splitlines()
     assert first.startswith("Traceback")
-    assert last.startswith("RuntimeError: no demonstration was kept")
+    assert last.startswith("RuntimeError: no demonstration was kept (")
+    assert "0 kept" in last
+
+
+@pytest.fixture
+def point(tmp_path: Path) -> Point:
+    return Point.planned({"dt": 0.5}, tmp_path)
+
+
+def test_failure_counts_the_time_of_its_own_attempt(point: Point) -> None:
+    started = (datetime.now(UTC) - timedelta(seconds=90)).isoformat()
+    note = {"identity": point.identity, "attempt": 2, "started": started}
+    write_note(point, "attempt", note)
+    write_failure(point, "died", "killed", "where", 2)
+    failure = point.failure()
+    assert 90 <= failure.pop("seconds") < 100
+    assert failure == {
+        "identity": point.identity, "source": point.source, "attempt": 2, "reason": "died",
+        "error": "killed", "traceback": "where", "started": started,
+    }  # fmt: skip
+    assert point.note("attempt") is None
+    write_note(point, "attempt", note)
+    write_failure(point, "died", "killed", "", 3)  # it did not get as far as its own note
+    assert (point.failure()["started"], point.failure()["seconds"]) == (None, None)
+
+
+def test_note_with_a_number_that_json_lacks_is_refused(point: Point) -> None:
+    with pytest.raises(ValueError, match="JSON"):
+        write_note(point, "record", {"seconds": float("nan")})
+    assert not list(point.results.rglob("record.json"))

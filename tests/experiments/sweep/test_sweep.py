@@ -132,21 +132,21 @@ def listed(folder: Path, *arguments: str) -> list[str]:
     return [line.partition("  ")[2] for line in out.splitlines() if line.startswith("run ")]
 
 
-def test_each_case_joins_each_combination(tmp_path: Path) -> None:
-    cases = "hydra.sweeper.cases=[[],['temperature=2'],['safety.width=0.1','seed=3']]"
+def test_each_of_the_settings_joins_each_combination(tmp_path: Path) -> None:
+    settings = "hydra.sweeper.settings=[[],['temperature=2'],['safety.width=0.1','seed=3']]"
     ends = ["", " temperature=2", " safety.width=0.1 seed=3"]
-    assert listed(tmp_path, cases) == ["defaults", *(end.strip() for end in ends[1:])]
+    assert listed(tmp_path, settings) == ["defaults", *(end.strip() for end in ends[1:])]
     swept = [f"dt={dt}{end}" for dt in (0.5, 1.0) for end in ends]
-    assert listed(tmp_path, "dt=0.5,1.0", cases) == swept
-    assert listed(tmp_path, "dt=0.5,1.0", cases.replace("seed=3", "seed=3,4")) == [
+    assert listed(tmp_path, "dt=0.5,1.0", settings) == swept
+    assert listed(tmp_path, "dt=0.5,1.0", settings.replace("seed=3", "seed=3,4")) == [
         name for name in swept for name in ([name, name[:-1] + "4"] if "seed" in name else [name])
     ]
-    # The command line wins, over one key of a case as over a swept one.
+    # The command line wins, over one key of them as over a swept one.
     names = [f"seed={seed}{end.removesuffix(' seed=3')}" for seed in (4, 5) for end in ends]
-    assert listed(tmp_path, cases, "seed=4,5") == names
+    assert listed(tmp_path, settings, "seed=4,5") == names
 
 
-def test_cases_of_an_experiment_stay_whole_at_smoke_scale(tmp_path: Path) -> None:
+def test_settings_of_an_experiment_stay_whole_at_smoke_scale(tmp_path: Path) -> None:
     (tmp_path / "experiment").mkdir()
     (tmp_path / "experiment" / "mine.yaml").write_text(
         """# @package _global_
@@ -156,7 +156,7 @@ hydra:
   sweeper:
     params:
       temperature: 1,2,3
-    cases:
+    settings:
       - []
       - [seed=1]
       - [grid=100, "tasks.lower=[null,-0.5]"]
@@ -164,10 +164,10 @@ hydra:
 """
     )
     words = ["experiment=mine", f"--config-dir={tmp_path}"]
-    cases = ["", " seed=1", " grid=100 tasks.lower=[null,-0.5]"]
+    lists = ["", " seed=1", " grid=100 tasks.lower=[null,-0.5]"]
     for scale, values, seeds in (([], (1, 2, 3), (2, 3, 4)), (["scale=smoke"], (1, 3), (2, 4))):
         found = listed(tmp_path, *scale, *words)
-        every = [*cases, *(f" seed={seed} case=some seeds: a few" for seed in seeds)]
+        every = [*lists, *(f" seed={seed} case=some seeds: a few" for seed in seeds)]
         assert found == [f"temperature={value}{case}" for value in values for case in every]
 
 
