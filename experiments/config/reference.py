@@ -147,9 +147,9 @@ def _defaults(command: str) -> dict[str, str]:
     """The default of each key, spelt as in a file, or the group that sets it."""
     spelling: dict[str, str] = {}
     for path in default_files(command):
-        for key, value in flatten(values_of(path)).items():
+        values = values_of(path)
+        for key, value in {**values, **flatten(values)}.items():
             spelling[key] = f"`{value if isinstance(value, str) else json.dumps(value)}`"
-        spelling |= {key: "`{}`" for key, value in values_of(path).items() if value == {}}
     for group in _GROUPS:
         files = [set(flatten(values_of(path))) for path in sorted((CONF / group).glob("*.yaml"))]
         spelling |= dict.fromkeys(set.intersection(*files), f"by `{group}`")
