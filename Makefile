@@ -1,20 +1,28 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
-# Every study, the paper's own first; the experiment `smoke` repeats it.
-STUDIES := paper $(filter-out paper smoke,$(basename $(notdir $(wildcard conf/experiment/*.yaml))))
+# The studies that the report needs, and all others; the experiment `smoke` repeats the paper's.
+STUDIES := paper telescope sensitivity in_cell calibration
+OTHERS := $(filter-out $(STUDIES) smoke,$(basename $(notdir $(wildcard conf/experiment/*.yaml))))
 
-.PHONY: help paper figures report smoke test stress lint benchmark lock
+.PHONY: help paper studies figures report smoke test stress lint benchmark lock
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-paper: $(READY) ## run what is missing of all studies, draw their figures, write the report
+paper: $(READY) ## run what is missing of the report's studies, draw their figures, write the report
 	@set -e; for each in $(STUDIES); do \
 		echo "=== study $$each"; \
 		$(BIN)/python experiments/run.py -m experiment=$$each; \
 	done
 	@$(MAKE) --no-print-directory figures
+
+studies: $(READY) ## run what is missing of all other studies, and draw their figures
+	@set -e; for each in $(OTHERS); do \
+		echo "=== study $$each"; \
+		$(BIN)/python experiments/run.py -m experiment=$$each; \
+		$(BIN)/python -m paper_figures $$each; \
+	done
 
 figures: $(READY) ## draw all figures and write the report again, from the tables alone
 	$(BIN)/python -m paper_figures
@@ -24,12 +32,12 @@ report: $(READY) ## write results/paper/REPORT.md and .html
 	$(BIN)/python -m paper_figures.report
 
 smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
-	@set -e; for each in $(STUDIES); do \
+	@set -e; for each in $(STUDIES) $(OTHERS); do \
 		echo "=== study $$each"; \
 		$(BIN)/python experiments/run.py -m experiment=$$each scale=smoke study=$$each \
 			results=$(CURDIR)/results/smoke; \
 	done
-	$(BIN)/python -m paper_figures --results results/smoke $(STUDIES)
+	$(BIN)/python -m paper_figures --results results/smoke $(STUDIES) $(OTHERS)
 	$(BIN)/python -m paper_figures.report --results results/smoke
 
 test: $(READY) ## run the tests, on all cores

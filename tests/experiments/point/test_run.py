@@ -15,12 +15,11 @@ from experiments.config.settings import Settings
 from experiments.point.run import run_point
 from experiments.point.tables import FIRST, PAPER_SIZE, opening_columns, table_bytes
 from experiments.tracking.store import Store
-from mlci.evidence import posterior
 
 WORDS = ["truth=wall", "horizon=4.0", "dt=0.5", "actions=3", "grid.shape=[16,8]"]
 WORDS += ["safety.shape=[41,21]", "demonstrations.pairs=14", "demonstrations.keep=11"]
 WORDS += ["demonstrations.restarts=1", "demonstrations.dt=0.05", "demonstrations.clip=true"]
-WORDS += ["inference.prior=0.3", "ranks.demonstrations=10", "ranks.subsets=6"]
+WORDS += ["ranks.demonstrations=10", "ranks.subsets=6"]
 WORDS += ["ranks.top=3", "rollouts=2"]
 
 
@@ -75,13 +74,6 @@ def test_first_are_the_first_five_and_probabilities_those_of_one_trial(point: tu
     assert chosen["truth_probability"] == feasible["truth_probability"].max()
     assert (example["constrained"][covered] == 0).all()
     assert (example["unconstrained"][covered] > 0).all()
-
-
-def test_posterior_has_the_prior_of_the_settings(point: tuple) -> None:
-    for name in ("hypotheses", "first"):
-        ranking = point[1][name]
-        each, _ = posterior(ranking["gain"].to_numpy(), 0.3)
-        np.testing.assert_allclose(ranking["posterior"], each, rtol=1e-12)
 
 
 def test_paths_and_their_times_are_every_fifth_sample(point: tuple) -> None:

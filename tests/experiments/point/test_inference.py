@@ -1,0 +1,34 @@
+"""The first step of a point: what it hands to the others."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from experiments.config.settings import Settings
+from experiments.point.inference import infer_point
+from experiments.tracking.store import Store
+from mlci.preparation import infer
+
+
+def test_settings_reach_the_inference(settings: Settings, tmp_path: Path) -> None:
+    prior = dataclasses.replace(settings.inference, prior=0.3)
+    settings = dataclasses.replace(settings, inference=prior)
+    point = infer_point(settings, Store(tmp_path))
+    assert point.inference.prior_none == 0.3
+    assert point.inference.hypotheses.names == settings.candidates.names
+    assert [name for name, true in zip(point.model.regions.names, point.truth, strict=True) if true]
+    assert not np.any(point.truth & point.hypotheses)
+    assert np.all(point.truth | point.hypotheses)
+    again = infer(point.model, point.demonstrations, hypotheses=point.hypotheses)
+    np.testing.assert_array_equal(again.phi, point.inference.phi)
+    trials = point.trials
+    for number, demonstration in zip(point.numbers, point.demonstrations, strict=True):
+        assert trials.outcome[number] == "kept"
+        np.testing.assert_array_equal(demonstration.states, trials.states[number])
+        np.testing.assert_array_equal(demonstration.task.start, trials.starts[number])
+        np.testing.assert_array_equal(demonstration.task.goal.upper, trials.goal_upper[number])
+        assert demonstration.task.horizon == settings.horizon
+    assert point.unreachable == np.sum(~point.inference.reachable)
