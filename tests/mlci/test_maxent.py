@@ -31,6 +31,7 @@ def toy_world(seed: int) -> TabularModel:
     allowed[0, 1] = allowed[0, 2] = True
     successor[1, 1], allowed[1, 1] = -1, False
     crosses = rng.random((6 * 4, 3)) < 0.15
+    crosses[3 * 4 : 4 * 4, 2] = True  # cell 3 lies in region 2: every move from it crosses that
     return toy_model(successor, rng.normal(size=(6, 4)), allowed, crosses)
 
 
