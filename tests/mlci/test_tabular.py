@@ -13,9 +13,9 @@ from toy_models import toy_model
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
-from mlci.spaces import Box
-from mlci.systems import DoubleIntegrator, Pendulum, System
-from mlci.tabular import action_grid, discretize
+from mlci.spaces import Box, StateSpace
+from mlci.systems import DoubleIntegrator, FunctionSystem, Pendulum, System
+from mlci.tabular import action_grid, discretize, substep_count
 
 
 def reference_segment(system: System, start: np.ndarray, control: np.ndarray, dt: float):
@@ -82,6 +82,22 @@ def test_a_thin_constraint_between_a_cell_and_its_successor_is_caught() -> None:
     assert int(grid.index(middle)) not in (cell, mdp.successor[cell, 2])
     assert mdp.crosses.toarray().reshape(grid.size, 5)[cell, 2]
     assert not mdp.under([True]).allowed[cell, 2]
+
+
+def test_a_move_goes_round_the_way_it_turns() -> None:
+    """At 9 rad/s for 0.5 s the short way round is the wrong one; a chord spans a quarter turn."""
+    circle = StateSpace(Box([0.0], [2 * np.pi]), [True], ("angle",), ("rad",))
+    rotor = FunctionSystem(lambda x, u: (u[..., 0],), circle, Box([-9.0], [9.0]))
+    grid, regions = Grid(circle, (8,)), Regions.from_grid(circle, (16,))
+    model = discretize(rotor, grid, [[9.0], [-9.0]], 0.5, regions)
+    assert substep_count(rotor, grid, model.actions, 0.5) == 3  # 4.5 rad in steps below pi / 2
+    crosses = model.crosses.toarray().reshape(8, 2, 16)
+    for cell in range(8):
+        for move, turn in enumerate((1, -1)):
+            begin = grid.centers[cell, 0]
+            path = np.linspace(begin, begin + turn * 4.5, 4001) % (2 * np.pi)
+            passed = np.unique((path[1:-1] // (np.pi / 8)).astype(int))
+            assert np.flatnonzero(crosses[cell, move]).tolist() == passed.tolist()
 
 
 def test_a_path_that_leaves_the_bounds_and_returns_is_not_allowed() -> None:
