@@ -112,7 +112,10 @@ def test_forced_point_is_done_only_by_a_new_attempt(points: list[PlannedPoint]) 
     assert list(failures) == ["a"]
 
 
-def test_fail_fast_leaves_the_rest_and_waits_for_nobody(points: list[PlannedPoint]) -> None:
+def test_fail_fast_leaves_the_rest_and_waits_for_nobody(
+    points: list[PlannedPoint], meanwhile: Callable[..., None]
+) -> None:
+    meanwhile(lambda: pytest.fail("it waits"))
     with points[1].point.lock:
         ends = {"a": "raised", "b": "elsewhere", "c": "unstarted"}
         _, failures, unstarted = run(points, fail_fast=True, **ends)
