@@ -26,7 +26,7 @@ from experiments.tracking.store import Store
 
 def run_here(
     point: Point, settings: Settings, log: Callable[[str], None], *, force: bool = False
-) -> State:
+) -> None:
     """Run a point in this process, unless it is done; waits for another process that runs it.
 
     Args:
@@ -34,15 +34,11 @@ def run_here(
         settings: what it is computed from.
         log: called with each line that the point prints.
         force: whether to run it even if it is done.
-
-    Returns:
-        State.DONE.
     """
     point.folder.mkdir(parents=True, exist_ok=True)
     with point.lock:
         if force or not point.is_done():
             _attempt(point, settings, log)
-    return State.DONE
 
 
 def run_in_worker(

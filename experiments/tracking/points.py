@@ -69,8 +69,9 @@ class Point:
 
     @cached_property
     def source(self) -> str:
-        """Hash of all the project's source that the result depends on, as it is now."""
-        return point_source(str(self.config.get("system", {}).get("target", "")))
+        """Hash of all the source that the result depends on, as it is now; runs none of it."""
+        target = str(self.config.get("system", {}).get("target", ""))
+        return source_hash([POINT_CODE, target.rpartition(".")[0]])
 
     @property
     def folder(self) -> Path:
@@ -137,8 +138,3 @@ class Point:
             return content if content["identity"] == self.identity else None
         except (OSError, ValueError, KeyError, TypeError):
             return None
-
-
-def point_source(target: str) -> str:
-    """Hash of the source of a point with a system, given by its dotted name; runs none of it."""
-    return source_hash([POINT_CODE, target.rpartition(".")[0]])

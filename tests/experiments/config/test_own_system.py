@@ -15,7 +15,7 @@ from refusals import refusal
 from experiments import advise, infer
 from experiments.config.paths import CHECKOUT, CONF
 from experiments.tracking import sources
-from experiments.tracking.points import point_source
+from experiments.tracking.points import Point
 from paper_figures import __main__ as figures
 
 SECTION = (CONF / "README.md").read_text().split("\n## Your own system\n")[1]
@@ -115,7 +115,7 @@ def test_source_counts_what_a_module_imports_from_beside_it(
         (tmp_path / "not_imported.py").write_text(other)
         for cached in (sources._read_source, sources._module_names, sources._neighbours):
             cached.cache_clear()
-        hashes.append(point_source("mine_own.Mine"))
+        hashes.append(Point.planned({"system": {"target": "mine_own.Mine"}}, tmp_path).source)
     assert hashes[0] != hashes[1] == hashes[2]
 
 

@@ -247,6 +247,20 @@ def test_death_is_recorded_once_and_only_of_a_later_attempt(point: Point) -> Non
     assert not (point.folder / "attempt.json").exists()
 
 
+def test_death_says_where_its_own_attempt_was(point: Point) -> None:
+    point.folder.mkdir(parents=True)
+    trace = point.folder / "crash_trace.txt"
+    text = "Timeout (0:00:02)!\nThread 1:\n  File x in inner\n  File y in run_in_worker\n"
+    record.write_note(point, "attempt", {"identity": point.identity, "attempt": 1})
+    trace.write_text(text)
+    failure = attempt.record_death(point, ChildProcessError("ended with 1"), 0)
+    assert (failure["reason"], failure["error"]) == ("timeout", "still running at its time limit")
+    assert failure["traceback"] == "Timeout (0:00:02)!\n  File x in inner"
+    trace.write_text(text)  # of the attempt before: the next one did not get as far as to start
+    failure = attempt.record_death(point, ChildProcessError("ended with 1"), 1)
+    assert (failure["reason"], failure["traceback"]) == ("died", "")
+
+
 def test_death_of_a_point_that_another_process_runs_is_not_recorded(point: Point) -> None:
     point.folder.mkdir(parents=True)
     with point.lock:

@@ -12,7 +12,7 @@ from tiny_point import composed, planned
 
 from experiments.config.read import read_config
 from experiments.tracking.files import digest
-from experiments.tracking.points import Point, State, point_source
+from experiments.tracking.points import Point, State
 
 # Changing this makes every point of every study anew: only when what a point is has changed.
 DEFAULT_POINT = "4eb828fd093491d20e0f080f71362122"
@@ -71,7 +71,7 @@ def test_point_known_by_name_has_the_config_of_its_record(point: Point) -> None:
     finish(point)
     known = Point(point.results, point.identity)
     assert known.config == point.config == CONFIG
-    assert known.source == point.source != point_source("")
+    assert known.source == point.source != Point.planned({}, point.results).source
     assert known.is_done()
 
 
