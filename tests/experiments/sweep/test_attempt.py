@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -199,6 +200,21 @@ def test_worker_runs_a_finished_point_again_only_if_forced(
     for force, attempts in ((False, 1), (False, 1), (True, 2)):
         assert attempt.run_in_worker(point, settings, force=force) is State.DONE
         assert point.attempts() == attempts
+
+
+def test_worker_has_its_time_limit(
+    point: Point, settings: Settings, quick: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quick()
+    limits: list[float | None] = []
+
+    def crash_trace(_: Point, time_limit: float | None) -> nullcontext[None]:
+        limits.append(time_limit)
+        return nullcontext()
+
+    monkeypatch.setattr(attempt, "crash_trace", crash_trace)
+    attempt.run_in_worker(point, settings, time_limit=7.0)
+    assert limits == [7.0]
 
 
 def test_lock_is_free_after_a_failure(
