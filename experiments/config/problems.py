@@ -71,7 +71,7 @@ def _lines(error: ValidationError, kind: Any, tree: Mapping[str, Any]) -> Iterat
             continue  # entries that are wrong do not count, and have lines of their own
         if each["type"] in ("unexpected_keyword_argument", "extra_forbidden", "invalid_key"):
             yield f"{key}: {_unknown(place, kind, tree)}"
-        elif each["type"] == "missing" and place[0] == "system":
+        elif each["type"] == "missing" and place[0] == "system" and "system" in tree:
             name = tree["system"]["_target_"].rpartition(".")[2]
             yield f"{key}: missing; {name} needs it"
         elif each["type"] in _WORDS:

@@ -130,6 +130,7 @@ WRONG = [
     ("system.speed_limit=-1", "system: Pendulum.speed_limit must be positive, not -1.0"),
     ("system.speed_limit=fast", "system.speed_limit: 'fast' is not a finite number"),
     ("~system._target_", "system._target_: missing"),
+    ("~system", "system: missing"),
     ("grid=300", "grid: there is no 300; there are 100, 400, 900, 1600, 2500"),
     ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, pain, wall"),
     ("grdi=100", "grdi: unknown key; did you mean grid?"),
