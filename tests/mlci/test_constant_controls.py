@@ -63,9 +63,9 @@ def test_a_wall_in_one_of_two_masses_has_its_braking_parabola(d, limit):
     near = np.abs(exact) < 0.3
     errors = []
     for step in (0.1, 0.05, 0.025):
-        error = escape_value(MASSES, wall(d), states[near], 6.0, step) - exact[near]
-        assert np.all(error > -1e-9)  # samples can only miss the closest approach
-        errors.append(error.max())
+        loss = exact[near] - escape_value(MASSES, wall(d), states[near], 6.0, step)
+        assert np.all(loss > -1e-9)
+        errors.append(loss.max())
     assert errors[-1] < 1e-3
     assert np.all(np.diff(np.log2(errors)) < -1.5)
 
@@ -77,9 +77,9 @@ def test_on_a_grid_the_equation_has_the_same_parabola():
         grid = Grid(MASSES.space, (count, count, 2, 2))
         exact = braking_value(*grid.centers[:, :2].T, 1.0)
         near = np.abs(exact) < 0.3
-        escapes = tabulate_escapes(MASSES, grid, wall(0), horizon=5.0, step=0.025)
+        escapes = escape_value(MASSES, wall(0), grid.centers, 5.0, 0.025)
         equation = solve_safe_set(MASSES, grid, wall(0))
-        exact_error.append(np.abs(escapes.values - exact)[near].max())
+        exact_error.append(np.abs(escapes - exact)[near].max())
         equation_error.append(np.abs(equation.values - exact)[near].mean())
     assert max(exact_error) < 1e-3
     assert equation_error[0] > 10 * max(exact_error)
@@ -166,6 +166,91 @@ def test_a_table_of_values_comes_closer_with_its_cells():
         table = tabulate_escapes(TELESCOPE, Grid(TELESCOPE.space, shape), PAIN, horizon=5.0)
         errors.append(np.abs(table.value(states) - exact)[near].mean())
     assert errors[1] < 0.6 * errors[0] < 0.06
+
+
+def least_distances(system, keep_out, states, seconds, dt):
+    """The best corner's least sampled distance; rates across a bound are stopped."""
+    lower, upper = system.space.bounds.lower, system.space.bounds.upper
+    lower = np.where(system.space.periodic, -FREE, lower)
+    upper = np.where(system.space.periodic, FREE, upper)
+    best = np.full(len(states), -np.inf)
+    for control in system.control_box.vertices():
+        now, least = states, keep_out.signed_distance(states)
+        for _ in range(round(seconds / dt)):
+            half = system.dynamics(now, control) * dt / 2
+            ahead = system.dynamics(np.clip(now + half, lower, upper), control)
+            now = np.clip(now + dt * ahead, lower, upper)
+            least = np.minimum(least, keep_out.signed_distance(now))
+        best = np.maximum(best, least)
+    return best
+
+
+PENDULUM = Pendulum(control_limit=0.5)
+TWO_PARTS = Regions(PENDULUM.space, [[np.pi, 0.0], [1.0, -1.0]], [[1.2 * np.pi, 1.2], [1.2, -0.8]])
+
+
+@pytest.mark.parametrize("step", [0.1, 0.05])
+@pytest.mark.parametrize(
+    ("system", "keep_out", "corner"),
+    [(TELESCOPE, PAIN, [1.0, 2.0, 10.0, 3.0]), (PENDULUM, TWO_PARTS, [2 * np.pi, 3.0])],
+)
+def test_no_state_with_a_value_above_zero_is_doomed_at_a_ten_times_finer_step(
+    system, keep_out, corner, step
+):
+    corner = np.array(corner)
+    states = np.random.default_rng(0).uniform(-corner, corner, (6000, len(corner)))
+    if system is TELESCOPE:
+        states[:, 2] = 8 + states[:, 2] / 5
+    value = escape_value(system, keep_out, states, 3.0, step)
+    near = np.abs(value) < 0.1
+    exact = least_distances(system, keep_out, states[near], 3.0, step / 10)
+    assert np.sum(exact < 0) > 30
+    assert not np.any((value[near] >= 0) & (exact < 0))
+    assert np.all(value[near] < exact + 2e-4)  # of the coarser oracle
+    assert np.mean(exact - value[near]) < 4 * step**2
+
+
+@dataclass(frozen=True, eq=False)
+class Stream(System):
+    """x' = 10, y' = u, and x goes round: the samples of a motion lie far apart."""
+
+    rise: float = 0.0
+
+    space = StateSpace(Box([-3.0, -3.0], [3.0, 3.0]), [True, False], ("x", "y"))
+
+    @property
+    def control_box(self):
+        return Box([self.rise - 0.1], [self.rise + 0.1])
+
+    def dynamics(self, states, controls):
+        rates = 10.0 + 0 * states[..., 0], controls[..., 0]
+        return np.stack(np.broadcast_arrays(*rates), axis=-1)
+
+
+def test_a_motion_that_leaps_over_k_between_two_samples_is_doomed():
+    needle = Regions(Stream.space, [[0.0, -1.0]], [[0.01, 1.0]])
+    states = np.array([[-0.5, 0.5], [-0.5, 1.5], [0.5, 0.5], [2.9, 1.2]])
+    value = escape_value(Stream(), needle, states, 0.1, 0.1)
+    assert value[0] == pytest.approx(-0.005, abs=1e-9)
+    # The second rises as it goes by; the third goes away, round the seam; the fourth as well.
+    assert value[1] == pytest.approx(0.505, abs=1e-3)
+    assert value[2] == pytest.approx(0.49)
+    assert 1.9 < value[3] < np.hypot(2.1, 0.21) + 1e-9
+
+
+def test_a_motion_may_be_closest_where_the_short_way_round_changes_sides():
+    box = Regions(Stream.space, [[-0.1, -0.1]], [[0.1, 0.1]])
+    value = escape_value(Stream(rise=-80.0), box, np.array([[2.9, 2.0]]), 0.05, 0.05)
+    assert 1.0 < value[0] < 6 - 3.15 - 0.1 + 0.01
+
+
+def test_a_step_serves_any_horizon():
+    table = tabulate_escapes(MASSES, Grid(MASSES.space, (9, 7, 2, 2)), wall(0), horizon=3.017)
+    exact = braking_value(*table.grid.centers[:, :2].T, 1.0)
+    near = np.abs(exact) < 0.5
+    loss = (exact - table.values)[near]
+    assert np.all(loss > -1e-9)
+    assert np.all(loss < 0.2 * 6 / 9)
 
 
 def test_a_step_that_does_not_divide_the_horizon_is_refused():
