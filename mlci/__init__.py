@@ -39,7 +39,7 @@ from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter
 from mlci.simulate import rollout
 from mlci.spaces import Box, StateSpace
-from mlci.system_check import check_system
+from mlci.system_check import check_affine, check_system
 from mlci.systems import (
     DoubleIntegrator,
     FunctionSystem,
@@ -69,6 +69,7 @@ __all__ = [
     "TelescopingPendulum",
     "TrajectoryDistribution",
     "action_grid",
+    "check_affine",
     "check_system",
     "demonstrate",
     "diagnose",

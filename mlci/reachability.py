@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.spaces import Bools, Floats
+from mlci.system_check import check_affine
 from mlci.systems import System
 
 _COURANT = 0.8  # share of the largest stable step; below 1 because ENO is not monotone
@@ -117,8 +118,9 @@ def solve_safe_set(
         The safe set; control-invariant only without a horizon.
 
     Raises:
-        ValueError: a horizon below 0, a tolerance that is not positive, or a region that is
-            everything or so small that the grid misses it.
+        ValueError: a horizon below 0, a tolerance that is not positive, a region that is
+            everything or so small that the grid misses it, or dynamics that are not affine in the
+            control.
         RuntimeError: no fixed point within 100 s of tau.
     """
     if horizon is not None and not horizon >= 0:
@@ -132,6 +134,7 @@ def solve_safe_set(
                 f"region {i} must hold at least one cell centre of a {list(grid.shape)} grid and "
                 f"not the whole space; signed distances to it start at {deepest:g}"
             )
+    check_affine(system)
     rates = _extremal_rates(system, grid)
     fastest = np.max(np.sum(np.max(np.abs(rates), axis=0).T / grid.widths, axis=-1))
     step = _COURANT / fastest

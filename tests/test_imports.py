@@ -22,7 +22,7 @@ MLCI = {
     "mlci.systems": "mlci.spaces",
     "mlci.system_check": "mlci.systems",
     "mlci.simulate": "mlci.systems",
-    "mlci.reachability": "mlci.regions mlci.systems",
+    "mlci.reachability": "mlci.regions mlci.system_check",
     "mlci.constant_controls": "mlci.reachability mlci.simulate",
     "mlci.safety_filter": "mlci.reachability",
     "mlci.ilqr": "mlci.simulate",

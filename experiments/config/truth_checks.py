@@ -13,6 +13,7 @@ import numpy as np
 from experiments.config.settings import NO_TRUTH, Settings
 from mlci.grids import Grid
 from mlci.spaces import Box
+from mlci.system_check import check_affine
 
 _MOST_VALUES = 100_000_000  # of a safe set's grid: about 1 GB for each of its arrays
 
@@ -60,8 +61,13 @@ def hypothesis_problems(settings: Settings) -> Iterator[str]:
 
 
 def safe_set_problems(settings: Settings) -> Iterator[str]:
-    """A safe set's grid that is too fine to hold or too coarse for the truth, and a wide border."""
+    """A wide border, dynamics without a safe set, and a grid that is too fine or too coarse."""
     safety, space = settings.safety, settings.model.space
+    if len(settings.constraint):
+        try:
+            check_affine(settings.model)
+        except ValueError as error:
+            yield f"truth: {settings.truth.name} needs a safe set, but {error}; or take truth=none"
     widest = float(np.max(space.bounds.widths))
     for key, value in (("margin", safety.margin), ("width", safety.width)):
         if value is not None and value > widest:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mlci.spaces import Box, StateSpace
-from mlci.system_check import check_system
-from mlci.systems import DoubleIntegrator, Pendulum, System
+from mlci.system_check import check_affine, check_system
+from mlci.systems import DoubleIntegrator, FunctionSystem, Pendulum, System, TelescopingPendulum
 
 
 class Line(System):
@@ -123,3 +123,47 @@ def test_wrong_jacobian_is_told_with_both_values():
         float, re.search(r"is (\S+) where differences give (\S+),", str(caught.value)).groups()
     )
     assert given - true == pytest.approx(0.5, abs=1e-5)
+
+
+def drives(push):
+    """A mass on a line that a control drives through a function."""
+    space = StateSpace(Box([-1, -1], [1, 1]), [False, False], ("x", "v"))
+    rates = lambda x, u: (x[..., 1], x[..., 0] + push(x, u[..., 0]))  # noqa: E731
+    return FunctionSystem(rates, space, Box([-2], [2]))
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        Pendulum(),
+        DoubleIntegrator(),
+        TelescopingPendulum(),
+        drives(lambda x, u: (1 + x[..., 0] ** 2) * u + 1e6 * x[..., 1] ** 3),
+    ],
+)
+def test_dynamics_that_are_affine_in_the_control_pass(system):
+    check_affine(system)
+
+
+@pytest.mark.parametrize(
+    "push",
+    [
+        lambda x, u: np.cos(3 * u),
+        lambda x, u: u**3,
+        lambda x, u: u * np.abs(u),
+        lambda x, u: u + 1e-4 * u**2,
+        lambda x, u: np.where(x[..., 0] > 0, np.tanh(u), u),
+    ],
+)
+def test_dynamics_that_are_not_affine_are_told_with_three_values(push):
+    system = drives(push)
+    check_system(system)
+    with pytest.raises(ValueError, match="dynamics is not affine") as caught:
+        check_affine(system)
+    message = re.search(
+        r"the rate of v is (\S+) at state .* and (\S+) and (\S+) at controls \[.* which makes (\S+);"
+        " take what enters the rates",
+        str(caught.value),
+    )
+    _, one, other, mean = map(float, message.groups())
+    assert min(one, other) <= mean <= max(one, other)
