@@ -161,8 +161,8 @@ def test_dynamics_that_are_not_affine_are_told_with_three_values(push):
     with pytest.raises(ValueError, match="dynamics is not affine") as caught:
         check_affine(system)
     message = re.search(
-        r"the rate of v is (\S+) at state .* and (\S+) and (\S+) at controls \[.* which makes (\S+);"
-        " take what enters the rates",
+        r"the rate of v is (\S+) at state .* and (\S+) and (\S+) at controls \[.* which makes "
+        r"(\S+); take what enters the rates",
         str(caught.value),
     )
     _, one, other, mean = map(float, message.groups())

@@ -11,9 +11,11 @@ import pandas as pd
 import pytest
 from commands import run_here
 from refusals import refusal
+from tiny_point import composed
 
 from experiments import advise, infer
 from experiments.config.paths import CHECKOUT, CONF
+from experiments.config.read import read_config
 from experiments.tracking import sources
 from experiments.tracking.points import Point
 from paper_figures import __main__ as figures
@@ -144,6 +146,10 @@ class Hinted(DoubleIntegrator):
 class Broken(DoubleIntegrator):
     def __init__(self):
         {}["key"]
+class Wheel(DoubleIntegrator):
+    def dynamics(self, states, controls):
+        return super().dynamics(states, np.cos(3 * controls))
+    jacobians = System.jacobians
 """
 REFUSED = {
     "system._target_=mine.Half": "system._target_: 'mine.Half' does not define control_box, space",
@@ -191,3 +197,16 @@ def test_word_that_a_subject_overrules_is_refused(
 ) -> None:
     said = refusal(["subject=unicycle", "truth=c1"], monkeypatch, capsys)
     assert "truth=c1: a subject brings its own; change values, such as grid.shape" in said
+
+
+def test_dynamics_that_are_not_affine_are_refused_with_a_truth_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(MINE)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    words = ["system=double_integrator", "system._target_=mine.Wheel"]
+    said = refusal([*words, "truth=wall"], monkeypatch, capsys)
+    assert "truth: wall needs a safe set, but Wheel.dynamics is not affine in the control" in said
+    assert said.rstrip().endswith("as the control; or take truth=none")
+    read_config(composed(*words, "truth=none"))
