@@ -12,6 +12,7 @@ from mlci.systems import System, central_differences
 
 _STATES, _CONTROLS = 7, 5  # that no system is likely to have as dimensions
 _TOLERANCE = 1e-4  # of a Jacobian, relative to its largest entry or 1
+_TRIED = _STATES * _CONTROLS  # states and controls at which a control's effect is tried
 _BENT = 1e-7  # of a rate's largest value or 1 that affine dynamics may be off by rounding
 
 
@@ -54,29 +55,29 @@ def check_affine(system: System) -> None:
     """Try whether dynamics are affine in the control: h at a mean of controls is the mean of h.
 
     Only then do the corners of the control box hold the best control for safety. Inference does
-    without. Tried at states (7, 1, n) and pairs of controls (5, m) drawn inside the boxes.
+    without. Tried at 35 states and pairs of controls drawn inside the boxes.
 
     Raises:
         ValueError: dynamics that are not affine in the control.
     """
     space, box = system.space, system.control_box
     rng = np.random.default_rng(0)
-    states = rng.uniform(space.bounds.lower, space.bounds.upper, (_STATES, 1, space.dimension))
-    one, other = rng.uniform(box.lower, box.upper, (2, _CONTROLS, box.dimension))
-    share = rng.uniform(0.2, 0.8, (_CONTROLS, 1))
+    states = rng.uniform(space.bounds.lower, space.bounds.upper, (_TRIED, space.dimension))
+    one, other = rng.uniform(box.lower, box.upper, (2, _TRIED, box.dimension))
+    share = rng.uniform(0.2, 0.8, (_TRIED, 1))
     between = share * one + (1 - share) * other
     rates = system.dynamics(states, between)
     ends = system.dynamics(states, one), system.dynamics(states, other)
     mean = share * ends[0] + (1 - share) * ends[1]
-    off = np.abs(rates - mean) - _BENT * np.maximum(1.0, np.max(np.abs(ends), axis=(0, 1, 2)))
+    off = np.abs(rates - mean) - _BENT * np.maximum(1.0, np.max(np.abs(ends), axis=(0, 1)))
     if np.any(off > 0):
-        i, j, d = np.unravel_index(int(np.argmax(off)), off.shape)
+        i, d = np.unravel_index(int(np.argmax(off)), off.shape)
         raise ValueError(
             f"{type(system).__name__}.dynamics is not affine in the control, so that the corners "
             f"of its box need not hold the safest one: the rate of {space.names[d]} is "
-            f"{rates[i, j, d]:.4g} at {_place(states[i, 0], between[j])}, and "
-            f"{ends[0][i, j, d]:.4g} and {ends[1][i, j, d]:.4g} at controls {_numbers(one[j])} "
-            f"and {_numbers(other[j])}, on both sides of it, which makes {mean[i, j, d]:.4g}; take "
+            f"{rates[i, d]:.4g} at {_place(states[i], between[i])}, and "
+            f"{ends[0][i, d]:.4g} and {ends[1][i, d]:.4g} at controls {_numbers(one[i])} "
+            f"and {_numbers(other[i])}, on both sides of it, which makes {mean[i, d]:.4g}; take "
             "what enters the rates, such as a force, as the control"
         )
 
