@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from mlci.control_problem import ControlFilter
 from mlci.demonstrations import REACHED, Demonstration, Task
-from mlci.ilqr import ControlFilter, optimize
+from mlci.ilqr import Solution, optimize
 from mlci.reachability import SafeSet
 from mlci.regions import Regions
 from mlci.simulate import rollout, step_count
@@ -61,7 +62,7 @@ class Attempt:
     Attributes:
         demonstration: the path, whether it was kept or not.
         outcome: kept, or why not.
-        cost: the optimiser's cost, effort and goal penalty.
+        cost: the optimiser's cost: minus the reward on the way, plus the goal's penalty.
         miss: distance of the last state from the goal, Euclidean in raw units; by any winding
             that the demonstrator may take.
         restart: which first guess led to it.
@@ -144,7 +145,8 @@ def demonstrate(
 ) -> list[Attempt]:
     """Let the demonstrator try every trial: equation (8) from each guess, of which the best counts.
 
-    The best restart is the cheapest that could be kept; if none could, the cheapest.
+    It maximises the system's `running_reward`. The best restart is the cheapest that could be kept;
+    if none could, the cheapest.
 
     Args:
         trials: at least one; all with guesses of one shape.
@@ -174,22 +176,13 @@ def demonstrate(
         wind=wind,
         limit=limit,
     )
-    entered = np.zeros(len(solution.states), dtype=bool)
+    misses = np.linalg.norm(solution.excess, axis=-1)
+    entered = np.zeros(len(misses), dtype=bool)
     if truth is not None:
         entered = enters(system, truth, solution.states, solution.controls, dt)
     left = ~np.all(system.space.contains(solution.states), axis=-1)
-    attempts = []
-    for number, task in enumerate(tasks):
-        own = np.arange(number * restarts, (number + 1) * restarts)
-        misses = np.linalg.norm(solution.excess[own], axis=-1)
-        failures = np.array([entered[own], left[own], ~(misses <= goal_tolerance)])
-        best = int(np.lexsort([solution.cost[own], failures.any(axis=0)])[0])
-        outcome = list(Outcome)[int(np.argmax([*failures[:, best], True]))]
-        path, controls = solution.states[own[best]], solution.controls[own[best]]
-        demonstration = Demonstration(task, path, controls, dt, f"trial_{number:03d}")
-        cost = float(solution.cost[own[best]])
-        attempts.append(Attempt(demonstration, outcome, cost, float(misses[best]), best))
-    return attempts
+    failures = np.stack([entered, left, ~(misses <= goal_tolerance)])
+    return _best_of(restarts, tasks, solution, failures, misses, dt)
 
 
 def crossing(
@@ -241,3 +234,24 @@ def _draw_safe(
         f"none of {_DRAWS} states drawn from {box} has V >= {margin}: choose a start box that "
         "meets the safe set"
     )
+
+
+def _best_of(
+    restarts: int,
+    tasks: Sequence[Task],
+    solution: Solution,
+    failures: Bools,
+    misses: Floats,
+    dt: float,
+) -> list[Attempt]:
+    """The best restart of each task, by failures (3, B), in the order of outcomes, and costs."""
+    first = np.arange(len(tasks)) * restarts
+    order = np.lexsort([solution.cost, failures.any(axis=0), np.repeat(first, restarts)])
+    attempts = []
+    for number, best in enumerate(order[first].tolist()):
+        outcome = list(Outcome)[int(np.argmax([*failures[:, best], True]))]
+        path, controls = solution.states[best], solution.controls[best]
+        demonstration = Demonstration(tasks[number], path, controls, dt, f"trial_{number:03d}")
+        cost, miss, restart = float(solution.cost[best]), float(misses[best]), best % restarts
+        attempts.append(Attempt(demonstration, outcome, cost, miss, restart))
+    return attempts

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from mlci.spaces import Box, Floats, StateSpace
-from mlci.systems import System, central_differences
+from mlci.systems import System, central_differences, reward_differences
 
 _STATES, _CONTROLS = 7, 5  # that no system is likely to have as dimensions
-_TOLERANCE = 1e-4  # of a Jacobian, relative to its largest entry or 1
 _TRIED = _STATES * _CONTROLS  # states and controls at which a control's effect is tried
+_TOLERANCE = 1e-4  # of a derivative, relative to its largest entry or 1
 _BENT = 1e-7  # of a rate's largest value or 1 that affine dynamics may be off by rounding
 
 
@@ -37,7 +37,7 @@ def check_system(system: System) -> None:
     controls = rng.uniform(box.lower, box.upper, (_CONTROLS, box.dimension))
     for array in (states, controls):
         array.flags.writeable = False
-    batch, n, m = (_STATES, _CONTROLS), space.dimension, box.dimension
+    batch, n = (_STATES, _CONTROLS), space.dimension
 
     def reward(x: Floats, u: Floats) -> Any:
         """It may depend on one of the two only."""
@@ -47,8 +47,14 @@ def check_system(system: System) -> None:
     with np.errstate(all="ignore"):
         _check_function(name, "dynamics", system.dynamics, (*batch, n), states, controls)
         _check_function(name, "running_reward", reward, batch, states, controls)
-        if type(system).jacobians is not System.jacobians:
-            _check_jacobians(name, system, (*batch, n, m), states, controls)
+        for method, differences, parts in (
+            ("jacobians", central_differences, ("dh/dx", "dh/du")),
+            ("reward_derivatives", reward_differences, ("the gradient", "the Hessian")),
+        ):
+            if getattr(type(system), method) is not getattr(System, method):
+                expected = dict(zip(parts, differences(system, states, controls), strict=True))
+                call = getattr(system, method)
+                _check_derivatives(f"{name}.{method}", call, expected, states, controls)
 
 
 def check_affine(system: System) -> None:
@@ -117,24 +123,30 @@ def _check_function(
             )
 
 
-def _check_jacobians(
-    name: str, system: System, shape: tuple[int, ...], states: Floats, controls: Floats
+def _check_derivatives(
+    where: str,
+    call: Callable[[Floats, Floats], Any],
+    expected: dict[str, Floats],
+    states: Floats,
+    controls: Floats,
 ) -> None:
-    """That Jacobians have their shapes and agree with differences."""
-    where, (*batch, n, m) = f"{name}.jacobians", shape
-    found = _called(where, system.jacobians, states, controls)
-    if not (isinstance(found, tuple) and len(found) == 2):
-        raise ValueError(f"{where} must be two arrays, dh/dx and dh/du, not {_sort(found)}")
-    differences = central_differences(system, states, controls)
-    for what, given, true, k in zip(("dh/dx", "dh/du"), found, differences, (n, m), strict=True):
-        _check_array(f"{where}: {what}", given, (*batch, n, k), states, controls)
-        off = np.abs(given - true) - _TOLERANCE * np.max(np.abs(true), initial=1.0)
-        if np.any(off > 0):
-            i, j, row, column = np.unravel_index(int(np.argmax(off)), off.shape)
+    """That two arrays of derivatives have the shapes of differences and agree with them."""
+    result = _called(where, call, states, controls)
+    if not (isinstance(result, tuple) and len(result) == len(expected)):
+        raise ValueError(
+            f"{where} must be two arrays, {' and '.join(expected)}, not {_sort(result)}"
+        )
+    for (part, differences), array in zip(expected.items(), result, strict=True):
+        _check_array(f"{where}: {part}", array, differences.shape, states, controls)
+        error = np.abs(array - differences)
+        error -= _TOLERANCE * np.max(np.abs(differences), initial=1.0)
+        if np.any(error > 0):
+            at = np.unravel_index(int(np.argmax(error)), error.shape)
+            i, j, *entry = at
             raise ValueError(
-                f"{where}: {what}[{row}, {column}] is {given[i, j, row, column]:.6g} where "
-                f"differences give {true[i, j, row, column]:.6g}, at "
-                f"{_place(states[i, 0], controls[j])}; mend it, or leave jacobians out"
+                f"{where}: {part}[{', '.join(map(str, entry))}] is {array[at]:.6g} where "
+                f"differences give {differences[at]:.6g}, at {_place(states[i, 0], controls[j])}; "
+                f"mend it, or leave {where.partition('.')[2]} out"
             )
 
 

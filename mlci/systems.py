@@ -10,9 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mlci.differences import first_derivatives, second_derivatives
 from mlci.spaces import Box, Floats, StateSpace
-
-_STEP = np.finfo(float).eps ** (1 / 3)  # where rounding and curvature err alike
 
 
 class System(ABC):
@@ -44,32 +43,48 @@ class System(ABC):
         return central_differences(self, states, controls)
 
     def running_reward(self, states: Floats, controls: Floats) -> Floats:
-        """r(x, u) (...,) at temperature 1: minus the squared control, as in (8)."""
-        return -np.sum(np.square(controls), axis=-1)
+        """r(x, u) (...,) at temperature 1: minus the squared control, as in (8).
+
+        The tabular agent and the demonstrator both maximise it. It repeats where a dimension does.
+        """
+        squares = np.square(controls)  # added one by one: sums along so short an axis are slow
+        return -sum((squares[..., d] for d in range(1, squares.shape[-1])), squares[..., 0])
+
+    def reward_derivatives(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
+        """Gradient (..., n + m) and Hessian (..., n + m, n + m) of r in (x, u).
+
+        Exact for the reward above, which is a quadratic; central differences for a system's own,
+        unless it knows.
+        """
+        if type(self).running_reward is not System.running_reward:
+            return reward_differences(self, states, controls)
+        n, m = states.shape[-1], controls.shape[-1]
+        gradient = np.zeros((*np.broadcast_shapes(states.shape[:-1], controls.shape[:-1]), n + m))
+        gradient[..., n:] = -2 * controls
+        hessian = np.diag(np.append(np.zeros(n), np.full(m, -2.0)))
+        return gradient, np.broadcast_to(hessian, (*gradient.shape, n + m))
 
 
 def central_differences(system: System, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
-    """dh/dx (..., n, n) and dh/du (..., n, m) by differences, good to some nine digits.
-
-    Complex steps would be exact, but are silently wrong where dynamics take a modulus or fill a
-    real array.
-    """
-
-    def differ(by: Floats, dynamics: Callable[[Floats], Floats]) -> Floats:
-        """Derivatives (..., n, k) of what gives derivatives (..., n) by its argument (..., k)."""
-        columns = []
-        for d in range(by.shape[-1]):
-            nudge = np.zeros(by.shape)
-            nudge[..., d] = _STEP * np.maximum(1.0, np.abs(by[..., d]))
-            above, below = by + nudge, by - nudge
-            width = above[..., d] - below[..., d]  # as rounded
-            columns.append((dynamics(above) - dynamics(below)) / width[..., None])
-        return np.stack(columns, axis=-1)
-
+    """dh/dx (..., n, n) and dh/du (..., n, m) by differences."""
     return (
-        differ(states, lambda moved: system.dynamics(moved, controls)),
-        differ(controls, lambda moved: system.dynamics(states, moved)),
+        first_derivatives(lambda moved: system.dynamics(moved, controls), states),
+        first_derivatives(lambda moved: system.dynamics(states, moved), controls),
     )
+
+
+def reward_differences(system: System, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
+    """Gradient (..., n + m) and Hessian (..., n + m, n + m) of r in (x, u) by differences."""
+    n, batch = states.shape[-1], np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
+    parts = [np.broadcast_to(part, (*batch, part.shape[-1])) for part in (states, controls)]
+    point = np.concatenate(parts, axis=-1)
+
+    def reward(z: Floats) -> Floats:
+        """r (...,), which may depend on states or controls alone."""
+        return np.broadcast_to(system.running_reward(z[..., :n], z[..., n:]), batch)
+
+    gradient = first_derivatives(lambda z: reward(z)[..., None], point)[..., 0, :]
+    return gradient, second_derivatives(reward, point)
 
 
 @dataclass(frozen=True, eq=False)

@@ -158,6 +158,159 @@ def test_swing_costs_what_pontryagin_says():
     np.testing.assert_allclose(found.states[0], applied, atol=1e-12)
 
 
+@dataclass(frozen=True, eq=False)
+class Quadratic(Linear):
+    """With r = -(1/2) z' cost z - slope . z, where z = (x, u)."""
+
+    cost: np.ndarray
+    slope: np.ndarray
+
+    def running_reward(self, states, controls):
+        z = np.concatenate([states, controls], axis=-1)
+        return -np.einsum("...i,ij,...j->...", z, self.cost, z) / 2 - z @ self.slope
+
+
+def test_one_iteration_solves_a_linear_problem_with_a_quadratic_reward_of_state_and_control():
+    rng = np.random.default_rng(4)
+    root = rng.normal(size=(5, 5))
+    system = Quadratic(
+        rng.normal(size=(2, 2)), rng.normal(size=(2, 3)), root @ root.T, rng.normal(size=5)
+    )
+    steps, dt, weight = 30, 0.05, 7.0
+    start, goal, guess = rng.normal(size=2), rng.normal(size=2), rng.normal(size=(steps, 3))
+    # All z = (x_k, u_k) are affine in all controls: z = free + reach u.
+    basis = np.eye(steps * 3).reshape(-1, steps, 3)
+    still = rollout(system, start, np.zeros((steps, 3)), dt, step=euler_step)
+    moved = rollout(system, np.tile(start, (steps * 3, 1)), basis, dt, step=euler_step) - still
+    reach = np.concatenate([moved[:, :-1], basis], axis=-1)
+    free = np.concatenate([still[:-1], np.zeros((steps, 3))], axis=-1)
+    hessian = dt * np.einsum("aki,ij,bkj->ab", reach, system.cost, reach)
+    hessian += 2 * weight * moved[:, -1] @ moved[:, -1].T
+    slope = dt * np.einsum("aki,ki->a", reach, free @ system.cost + system.slope)
+    slope += 2 * weight * moved[:, -1] @ (still[-1] - goal)
+    exact = -np.linalg.solve(hessian, slope).reshape(steps, 3)
+    solution = solve_one(system, start, goal, guess, dt, goal_weight=weight, iterations=1)
+    np.testing.assert_allclose(solution.controls[0], exact, atol=1e-5)
+
+
+class Upright(Pendulum):
+    """Pays for leaning as well: concave in the angle, seen as a cost, below the horizontal."""
+
+    def running_reward(self, states, controls):
+        return -(controls[..., 0] ** 2 + 1 - np.cos(states[..., 0]))
+
+    @staticmethod
+    def control(q):
+        return -q / 2
+
+    slope = staticmethod(np.sin)  # of the state's cost, by the angle
+
+
+class Gentle(Pendulum):
+    """Finds strong controls dearer than their square."""
+
+    def running_reward(self, states, controls):
+        return -(controls[..., 0] ** 2 + controls[..., 0] ** 4 / 4)
+
+    @staticmethod
+    def control(q):
+        root = np.sqrt(q**2 / 4 + 8 / 27)  # Cardano's for u^3 + 2 u + q = 0
+        return np.cbrt(-q / 2 + root) + np.cbrt(-q / 2 - root)
+
+    slope = staticmethod(np.zeros_like)
+
+
+@pytest.mark.parametrize("system", [Upright(), Gentle()], ids=lambda each: type(each).__name__)
+def test_swing_with_a_reward_of_its_own_is_the_one_that_pontryagin_says(system):
+    # Minimum of -int r: d(-r)/du = -q, with costates p' = d r/d theta - q cos(theta), q' = -p.
+    def motion(_, y):
+        angle, speed, p, q = y
+        pull = -q * np.cos(angle) - system.slope(angle)
+        return np.stack([speed, np.sin(angle) + system.control(q), pull, -p])
+
+    def ends(first, last):
+        return np.array([first[0] - 0.5, first[1], last[0] - 3.0, last[1]])
+
+    time = np.linspace(0, 5, 200)
+    line = np.stack([np.linspace(0.5, 3, 200), np.full(200, 0.5), 0 * time, 0 * time])
+    exact = solve_bvp(motion, ends, time, line, tol=1e-8, max_nodes=100_000)
+    assert exact.success
+    fine = np.linspace(0, 5, 20_001)
+    path = exact.sol(fine)
+    controls = system.control(path[3])
+    cost = np.trapezoid(-system.running_reward(path[:2].T, controls[:, None]), fine)
+    # What |u|^2 alone would choose costs more by far than the tolerances below.
+    plain = solve_one(PENDULUM, [0.5, 0], [3, 0], np.zeros((500, 1)), iterations=60).controls[0]
+    assert np.max(np.abs(plain[:, 0] - controls[:-1:40])) > 0.1
+
+    costs = []
+    for dt in (0.01, 0.005):
+        guess = np.zeros((round(5 / dt), 1))
+        options = {"goal_weight": 1e5, "iterations": 80}
+        solution = solve_one(system, [0.5, 0], [3, 0], guess, dt, **options)
+        costs.append(solution.cost[0])
+        held = solution.controls[0, :, 0] - controls[: -1 : round(dt / 0.00025)]
+        # A control held for dt differs from the continuous one by about |u'| dt, with |u'| <= 2.
+        assert np.max(np.abs(held)) < 2 * dt
+    # Euler's step errs by the first order in dt, which two steps of it cancel; what is left is of
+    # the second order, and what the goal's price lets the end miss, |p|^2 / (4 * 1e5).
+    assert 2 * costs[1] - costs[0] == pytest.approx(cost, rel=3e-5)
+
+
+def test_scale_of_a_reward_is_no_matter():
+    @dataclass(frozen=True)
+    class Dear(Pendulum):
+        price: float = 1.0
+
+        def running_reward(self, states, controls):
+            return -self.price * np.square(controls[..., 0])
+
+        def reward_derivatives(self, states, controls):
+            gradient, hessian = Pendulum().reward_derivatives(states, controls)
+            return self.price * gradient, self.price * hessian
+
+    guess, power = np.full((200, 1), 0.7), 2.0**20  # whose products are exact
+    once = solve_one(Dear(), [0.5, 0], [3, 0], guess)
+    more = solve_one(Dear(price=power), [0.5, 0], [3, 0], guess, goal_weight=300 * power)
+    np.testing.assert_array_equal(more.controls, once.controls)
+    np.testing.assert_array_equal(more.costs, power * once.costs)
+    np.testing.assert_array_equal(
+        once.controls, solve_one(PENDULUM, [0.5, 0], [3, 0], guess).controls
+    )
+
+
+class Curious(Pendulum):
+    """Likes some of the controls that it does not like: -r is not convex, in u, x, or both."""
+
+    def running_reward(self, states, controls):
+        u, speed = controls[..., 0], states[..., 1]
+        return 0.5 * np.cos(3 * u) - 0.1 * u**2 + 0.4 * u * speed - 0.2 * speed**2
+
+
+def test_reward_that_is_not_concave_is_improved_nevertheless():
+    rng = np.random.default_rng(6)
+    starts, goals = rng.uniform([0, -1], [2 * np.pi, 1], (2, 20, 2))
+    guesses = held_controls(rng, 20, 10, 30)
+    solution = optimize(Curious(), starts, goals, goals, guesses, DT, iterations=8)
+    assert np.all(np.diff(solution.costs, axis=0) <= 0)
+    # Every step is downhill, so that a short one succeeds at once.
+    assert np.all(np.diff(solution.costs[:4], axis=0) < 0)
+
+
+def test_reward_of_states_alone_is_optimised():
+    # Nothing is paid for the control, so that the limit alone holds it back: full throttle.
+    class Eager(DoubleIntegrator):
+        def running_reward(self, states, controls):
+            return states[..., 1]
+
+    free = np.array([[-np.inf, -np.inf]])
+    solution = optimize(
+        *(Eager(), np.zeros((1, 2)), free, -free, np.zeros((1, 100, 1)), DT), limit=MASS.control_box
+    )
+    np.testing.assert_allclose(solution.controls[0, :-1], 1.0)  # the last one moves no state
+    assert solution.cost[0] == pytest.approx(-0.5 * (1 - DT))
+
+
 @pytest.mark.parametrize(
     ("lower", "upper", "effort"),
     [

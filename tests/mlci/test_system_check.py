@@ -52,6 +52,12 @@ def jacobians(change):
     return broken(jacobians=lambda self, x, u: change(*System.jacobians(self, x, u)))
 
 
+def reward_derivatives(change):
+    """Derivatives of the reward as differences give them, changed."""
+    known = System.reward_derivatives
+    return broken(reward_derivatives=lambda self, x, u: change(*known(self, x, u)))
+
+
 def spoil_one(by_state, by_control):
     by_state = by_state.copy()
     by_state[..., 0, 2] += 0.5
@@ -106,6 +112,28 @@ FAULTS = {
         f"jacobians: dh/du must be (7, 5, 3, 2) {BATCH}, not (7, 5, 3, 1)",
     ),
     "wrong Jacobian": (jacobians(spoil_one), "jacobians: dh/dx[0, 2] is "),
+    "gradient alone": (
+        reward_derivatives(lambda gradient, hessian: gradient),
+        "reward_derivatives must be two arrays, the gradient and the Hessian, not ndarray",
+    ),
+    "shape of a Hessian": (
+        reward_derivatives(lambda gradient, hessian: (gradient, hessian[..., 3:])),
+        f"the Hessian must be (7, 5, 5, 5) {BATCH}, not (7, 5, 5, 2)",
+    ),
+    "wrong gradient": (
+        reward_derivatives(lambda gradient, hessian: (-gradient, hessian)),
+        "reward_derivatives: the gradient[",
+    ),
+    "derivatives of another reward": (
+        broken(
+            running_reward=lambda self, x, u: -np.sum(u**2, axis=-1) - 0 * x[..., 0],
+            reward_derivatives=lambda self, x, u: (
+                System.reward_derivatives(self, x, u)[0],
+                np.zeros((7, 5, 5, 5)),
+            ),
+        ),
+        "reward_derivatives: the Hessian[3, 3] is 0 where differences give -2, at state [",
+    ),
 }
 
 

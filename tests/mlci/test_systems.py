@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 
 from mlci.simulate import rollout
-from mlci.systems import DoubleIntegrator, Pendulum, System, TelescopingPendulum
+from mlci.systems import (
+    DoubleIntegrator,
+    Pendulum,
+    System,
+    TelescopingPendulum,
+    reward_differences,
+)
 
 SYSTEMS = [Pendulum(gravity=9.81, length=0.7), DoubleIntegrator(), TelescopingPendulum()]
 
@@ -119,3 +125,43 @@ def test_parameters_that_are_not_positive_are_refused(make, parameter, value):
 def test_a_leg_that_cannot_lengthen_is_refused():
     with pytest.raises(ValueError, match=r"shortest must be below longest, not 5\.0 and 5\.0"):
         TelescopingPendulum(longest=5.0)
+
+
+class Curved(Pendulum):
+    """A reward whose derivatives are known, and leaves none of them out."""
+
+    def running_reward(self, states, controls):
+        return np.sin(states[..., 0]) * controls[..., 0] - states[..., 1] ** 3
+
+    def exact(self, states, controls):
+        sine, cosine = np.sin(states[..., 0]), np.cos(states[..., 0])
+        speed, u = np.broadcast_arrays(states[..., 1], controls[..., 0])
+        gradient = np.stack(np.broadcast_arrays(cosine * u, -3 * speed**2, sine), axis=-1)
+        hessian = np.zeros((*gradient.shape, 3))
+        hessian[..., 0, 0], hessian[..., 1, 1] = -sine * u, -6 * speed
+        hessian[..., 0, 2] = hessian[..., 2, 0] = cosine
+        return gradient, hessian
+
+
+def test_derivatives_of_a_reward_are_differences_unless_it_is_the_default():
+    rng = np.random.default_rng(2)
+    states, controls = rng.normal(size=(40, 1, 2)), rng.normal(size=(4, 1))
+    gradient, hessian = Curved().reward_derivatives(states, controls)
+    known = Curved().exact(states, controls)
+    np.testing.assert_allclose(gradient, known[0], rtol=1e-9, atol=1e-8)
+    np.testing.assert_allclose(hessian, known[1], rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("system", SYSTEMS, ids=lambda system: type(system).__name__)
+def test_derivatives_of_the_default_reward_are_exact(system):
+    rng = np.random.default_rng(3)
+    n, m = system.space.dimension, system.control_box.dimension
+    states, controls = rng.normal(size=(5, 1, n)), rng.normal(size=(3, m))
+    gradient, hessian = system.reward_derivatives(states, controls)
+    for array, differences in zip(
+        (gradient, hessian), reward_differences(system, states, controls), strict=True
+    ):
+        np.testing.assert_allclose(array, differences, rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(gradient[..., n:], np.broadcast_to(-2 * controls, (5, 3, m)))
+    assert not gradient[..., :n].any()
+    assert set(hessian.ravel()) == {0.0, -2.0}
