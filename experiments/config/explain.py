@@ -86,8 +86,9 @@ def _explain_override(error: HydraException | OmegaConfBaseException) -> str:
 
 
 def _known_keys() -> list[str]:
-    """Every dotted key of a config, groups of files included."""
-    return [*field_keys(RunSettings), "experiment", "subject", "scale"]
+    """Every key at the top of a config, groups of files included."""
+    keys = [key for key in field_keys(RunSettings) if "." not in key]
+    return [*keys, "experiment", "subject", "scale"]
 
 
 def _first_line(error: BaseException) -> str:
