@@ -256,3 +256,35 @@ def test_a_safe_set_checks_its_arrays():
         SafeSet(grid, np.zeros((4, 5)), np.zeros((20, 2)))
     with pytest.raises(ValueError, match="finite"):
         SafeSet(grid, np.full(20, np.nan), np.zeros((20, 2)))
+
+
+def is_doomed(states):
+    """Whether the pendulum cannot stay out of BOTTOM, in closed form.
+
+    The box is left alone by who stands below it (u = -2 pushes down, for sin(angle) < 2), above it
+    (u = 2) or behind it. It can be forced in only through its left side, angle = pi, at a velocity
+    between 0 and 1.2. Under a held u, d/dt (w^2 / 2 + cos(angle) - u angle) = 0. So who comes from
+    the left escapes in two ways: u = -2 stops it before the side if it is below the arc through the
+    lower corner (pi, 0), and u = 2 lifts it over the box if it is above the arc through the upper
+    corner (pi, 1.2). Between the arcs it is doomed, as inside the box.
+    """
+    angle, velocity = states.T
+    energy = velocity**2 / 2 + np.cos(angle)
+    cannot_stop = energy + 2 * angle > -1 + 2 * np.pi
+    cannot_rise = energy - 2 * angle < 1.2**2 / 2 - 1 - 2 * np.pi
+    before = (angle <= np.pi) & (velocity > 0) & cannot_stop & cannot_rise
+    return before | (region(PENDULUM, BOTTOM).signed_distance(states) < 0)
+
+
+@pytest.mark.parametrize("count", [51, 101, 201])
+def test_the_pendulums_border_has_its_closed_form_within_half_a_cell(count):
+    grid = Grid(PENDULUM.space, (count, count))
+    safe_set = solve_safe_set(PENDULUM, grid, region(PENDULUM, BOTTOM))
+    states = np.random.default_rng(0).uniform([np.pi - 0.5, -0.5], [1.3 * np.pi, 1.7], (40_000, 2))
+    turns = np.arange(32) / 32 * 2 * np.pi
+    ring = grid.widths / 2 * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    doomed = is_doomed(states)
+    around = np.array([is_doomed(states + shift) for shift in ring])
+    clear = np.all(around == doomed, axis=0)
+    assert 0.05 < np.mean(doomed[clear]) < 0.5
+    np.testing.assert_array_equal(safe_set.contains(states[clear]), ~doomed[clear])
