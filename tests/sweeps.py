@@ -43,7 +43,7 @@ class Faulty(DoubleIntegrator):
     fault: str = "none"
 
     def dynamics(self, states, controls):
-        accepted = len(states) > 10  # and not tried before any work
+        accepted = len(states) > 100  # and not tried before any work
         fault = self.fault if accepted and not Path("healed").exists() else "none"
         if fault == "raise":
             raise ArithmeticError("the mass fell off its line")

@@ -11,7 +11,7 @@ from mlci.systems import DoubleIntegrator
 class Held(DoubleIntegrator):
     def dynamics(self, states, controls):
         # A config is tried with few states before any work.
-        while len(states) > 10 and os.path.exists(os.environ["HOLD"]):
+        while len(states) > 100 and os.path.exists(os.environ["HOLD"]):
             time.sleep(0.1)
         return super().dynamics(states, controls)
 END

@@ -50,7 +50,7 @@ class Deadly(DoubleIntegrator):
     deadly: bool = False
 
     def dynamics(self, states, controls):
-        if self.deadly and len(states) > 10 and not Path("healed").exists():
+        if self.deadly and len(states) > 100 and not Path("healed").exists():
             os.killpg(os.getpgid(0), signal.SIGKILL)
         return super().dynamics(states, controls)
 """
