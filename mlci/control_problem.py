@@ -2,11 +2,12 @@
 
 Each member of a batch minimises, over the controls u_k inside a box where there is a limit,
 
-    -sum_k r(x_k, v_k) dt + goal_weight |excess(x_K)|^2,    x_{k+1} = x_k + dt h(x_k, v_k),
+    -sum_k r(x_k, v_k) dt + goal_weight |excess(x_K)|^2,    x_{k+1} = step(x_k, v_k),
 
-where r is the system's `running_reward`, v_k = filter(x_k, u_k) is the control that a safety filter
-lets through, and `excess` is how far the last state is outside the goal: by the winding of periodic
-dimensions that is nearest to that state, or to the start. Members never influence each other.
+where r is the system's `running_reward`, `step` an integrator's step of dt, v_k = filter(x_k, u_k)
+the control that a safety filter lets through, and `excess` how far the last state is outside the
+goal: by the winding of periodic dimensions that is nearest to that state, or to the start. Members
+never influence each other.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from mlci.simulate import Integrator
 from mlci.spaces import Box, Floats, Ints
 from mlci.systems import System
 
@@ -57,6 +59,7 @@ class ControlProblem:
         wind: whether any number of turns may lead to the goal; else only the winding of its middle
             that is nearest to the start, at most half a turn away.
         limit: range that controls are clipped to, before the filter; None for no limit.
+        integrator: how states move on.
     """
 
     system: System
@@ -68,6 +71,7 @@ class ControlProblem:
     safety_filter: ControlFilter
     wind: bool
     limit: Box | None
+    integrator: Integrator
 
     def of(self, members: Ints) -> ControlProblem:
         """The problems of some members only."""

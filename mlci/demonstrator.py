@@ -18,7 +18,7 @@ from mlci.demonstrations import REACHED, Demonstration, Task
 from mlci.ilqr import Solution, optimize
 from mlci.reachability import SafeSet
 from mlci.regions import Regions
-from mlci.simulate import rollout, step_count
+from mlci.simulate import EULER, Integrator, rollout, step_count
 from mlci.spaces import Bools, Box, Floats
 from mlci.systems import System
 
@@ -142,6 +142,7 @@ def demonstrate(
     goal_tolerance: float = REACHED,
     wind: bool = True,
     limit: Box | None = None,
+    integrator: Integrator = EULER,
 ) -> list[Attempt]:
     """Let the demonstrator try every trial: equation (8) from each guess, of which the best counts.
 
@@ -158,6 +159,7 @@ def demonstrate(
         goal_tolerance: largest distance from the goal that counts as reached, in raw units.
         wind: whether any number of turns may lead to a goal, see `optimize`.
         limit: range of the controls, such as the control box; None for no limit.
+        integrator: how states move on; the filter's is to be the same.
 
     Returns:
         One attempt a trial, in their order.
@@ -175,6 +177,7 @@ def demonstrate(
         safety_filter=safety_filter,
         wind=wind,
         limit=limit,
+        integrator=integrator,
     )
     misses = np.linalg.norm(solution.excess, axis=-1)
     entered = np.zeros(len(misses), dtype=bool)
@@ -209,8 +212,8 @@ def crossing(
 def enters(system: System, truth: Regions, states: Floats, controls: Floats, dt: float) -> Bools:
     """Which paths (B,) enter a region of the truth.
 
-    Looked for on the straight lines between samples, and at ten points between samples of the
-    motion that the held control makes.
+    Looked for on the straight lines between samples, which are Euler's steps, and at ten points
+    between samples of the motion that the held control makes, which Runge-Kutta steps follow.
 
     Args:
         states: (B, K+1, n) paths.

@@ -23,7 +23,7 @@ from mlci.control_problem import (
     total_cost,
 )
 from mlci.riccati import feedback
-from mlci.simulate import euler_step
+from mlci.simulate import EULER, Integrator
 from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.systems import System
 
@@ -70,6 +70,7 @@ def optimize(
     safety_filter: ControlFilter | None = None,
     wind: bool = True,
     limit: Box | None = None,
+    integrator: Integrator = EULER,
 ) -> Solution:
     """Solve (8) for every member of a batch, from its own first guess.
 
@@ -79,13 +80,14 @@ def optimize(
         goal_lower: (B, n) lower corners of the goals.
         goal_upper: (B, n) upper corners.
         controls: (B, K, m) first guesses.
-        dt: time step of the explicit Euler integrator [s].
+        dt: time step of the integrator [s].
         goal_weight: price of the squared terminal error.
         iterations: at most so many.
         tolerance: a member stops when an iteration lowers its cost by a smaller share than this.
         safety_filter: acts inside the rollout and its derivatives in the linearisation.
         wind: whether any number of turns may lead to the goal.
         limit: range of the controls.
+        integrator: how states move on in a time step.
 
     Raises:
         ValueError: shapes that disagree, or a goal side with one infinite end.
@@ -94,7 +96,7 @@ def optimize(
     check_shapes(system, starts, goal_lower, goal_upper, controls)
     filter_ = NoFilter() if safety_filter is None else safety_filter
     problem = ControlProblem(
-        system, starts, goal_lower, goal_upper, dt, goal_weight, filter_, wind, limit
+        system, starts, goal_lower, goal_upper, dt, goal_weight, filter_, wind, limit, integrator
     )
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging candidate is not an error
         paths = _first_paths(problem, np.moveaxis(controls, 1, 0))
@@ -153,14 +155,14 @@ def _roll_out(
     states = np.empty((len(shift) + 1, *shape))
     wanted = np.empty((len(shift), *shape[:2], shift.shape[-1]))
     applied = np.empty_like(wanted)
-    states[0] = problem.starts
+    states[0], step = problem.starts, problem.integrator.step
     for k in range(len(shift)):
         reaction = (gain[k] @ (states[k] - around.states[k])[..., None])[..., 0]
         wanted[k] = around.wanted[k] + scale * shift[k] + reaction
         if problem.limit is not None:
             wanted[k] = np.clip(wanted[k], problem.limit.lower, problem.limit.upper)
         applied[k] = problem.safety_filter.apply(states[k], wanted[k])
-        states[k + 1] = euler_step(problem.system, states[k], applied[k], problem.dt)
+        states[k + 1] = step(problem.system, states[k], applied[k], problem.dt)
     return Paths(states, wanted, applied, total_cost(problem, states, applied))
 
 

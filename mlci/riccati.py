@@ -65,7 +65,8 @@ def _motion(problem: ControlProblem, paths: Paths) -> tuple[Floats, Floats]:
     states, dt = paths.states[:-1], problem.dt
     n = states.shape[-1]
     through = np.concatenate(problem.safety_filter.linearize(states, paths.wanted), axis=-1)
-    drift, push = problem.system.jacobians(states, paths.applied)
+    jacobians = problem.integrator.rate_jacobians
+    drift, push = jacobians(problem.system, states, paths.applied, dt)
     step = dt * (push @ through)
     step[..., :n] += dt * drift + np.eye(n)
     return step, through

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlci.reachability import SafeSet
+from mlci.simulate import EULER, Integrator
 from mlci.spaces import Floats
 from mlci.systems import System
 
@@ -15,7 +16,7 @@ from mlci.systems import System
 class SafetyFilter:
     """Replaces a control by u* when the state after one more hold would not be safe.
 
-    With z = (V(x + dt h(x, u)) - margin) / width, the applied control is
+    With z = (V(x') - margin) / width, where x' is the state one step later, the applied control is
 
         lambda(z) u + (1 - lambda(z)) u*(x),    lambda = 0 for z <= 0, z^2 (3 - 2z), 1 for z >= 1.
 
@@ -27,6 +28,7 @@ class SafetyFilter:
         dt: hold time of the controls [s].
         margin: smallest V that a free control may lead to, in the unit of V.
         width: range of V above the margin over which the relaxed filter blends.
+        integrator: how states move on, the same as the demonstrator's.
 
     Raises:
         ValueError: dt not positive, or a margin or width below 0.
@@ -37,6 +39,7 @@ class SafetyFilter:
     dt: float
     margin: float
     width: float = 0.0
+    integrator: Integrator = EULER
 
     def __post_init__(self) -> None:
         if not self.dt > 0:
@@ -76,11 +79,11 @@ class SafetyFilter:
         blend = slope > 0
         if blend.any():
             x, u = states[blend], controls[blend]
-            ahead = x + self.dt * self.system.dynamics(x, u)
+            ahead = self.integrator.step(self.system, x, u, self.dt)
             gradient = slope[blend][:, None] * self.safe_set.slope(ahead)
-            dynamics_by_state, dynamics_by_control = self.system.jacobians(x, u)
-            by_x = gradient + self.dt * np.einsum("bi,bij->bj", gradient, dynamics_by_state)
-            by_u = self.dt * np.einsum("bi,bij->bj", gradient, dynamics_by_control)
+            drift, push = self.integrator.rate_jacobians(self.system, x, u, self.dt)
+            by_x = gradient + self.dt * np.einsum("bi,bij->bj", gradient, drift)
+            by_u = self.dt * np.einsum("bi,bij->bj", gradient, push)
             override = u - self.safe_set.safe_control(self.system, x)
             by_state[blend] += override[:, :, None] * by_x[:, None, :]
             by_control[blend] += override[:, :, None] * by_u[:, None, :]
@@ -88,7 +91,7 @@ class SafetyFilter:
 
     def _share(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
         """lambda (...,), and its derivative (...,) by V after the hold."""
-        ahead = states + self.dt * self.system.dynamics(states, controls)
+        ahead = self.integrator.step(self.system, states, controls, self.dt)
         room = self.safe_set.value(ahead) - self.margin
         if self.width == 0:
             return np.where(room >= 0, 1.0, 0.0), np.zeros(room.shape)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,21 @@ from mlci.spaces import Floats
 from mlci.systems import System
 
 Step = Callable[[System, Floats, Floats, float], Floats]
+StepJacobians = Callable[[System, Floats, Floats, float], tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """How a state moves on under a held control, and how that depends on both.
+
+    Attributes:
+        step: states (..., n) and controls (..., m) to states (..., n) after dt.
+        rate_jacobians: derivatives of the mean rate (x' - x) / dt of a step from x to x': by the
+            state (..., n, n), and by the control (..., n, m).
+    """
+
+    step: Step
+    rate_jacobians: StepJacobians
 
 
 def step_count(horizon: float, dt: float, tolerance: float = 1e-9) -> int:
@@ -42,6 +58,33 @@ def rk4_step(system: System, states: Floats, controls: Floats, dt: float) -> Flo
     k3 = system.dynamics(states + dt / 2 * k2, controls)
     k4 = system.dynamics(states + dt * k3, controls)
     return states + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+def euler_rate_jacobians(
+    system: System, states: Floats, controls: Floats, _dt: float
+) -> tuple[Floats, Floats]:
+    """dh/dx and dh/du: the rate of an Euler step is that of its start."""
+    return system.jacobians(states, controls)
+
+
+def rk4_rate_jacobians(
+    system: System, states: Floats, controls: Floats, dt: float
+) -> tuple[Floats, Floats]:
+    """Derivatives of the mean rate of a Runge-Kutta step, stage by stage by the chain rule."""
+    stage = system.dynamics(states, controls)
+    by_state, by_control = system.jacobians(states, controls)
+    sums = [by_state, by_control]
+    for reach, weight in ((dt / 2, 2), (dt / 2, 2), (dt, 1)):
+        drift, push = system.jacobians(states + reach * stage, controls)
+        stage = system.dynamics(states + reach * stage, controls)
+        by_state = drift + reach * (drift @ by_state)
+        by_control = push + reach * (drift @ by_control)
+        sums = [sums[0] + weight * by_state, sums[1] + weight * by_control]
+    return sums[0] / 6, sums[1] / 6
+
+
+EULER = Integrator(euler_step, euler_rate_jacobians)
+RK4 = Integrator(rk4_step, rk4_rate_jacobians)
 
 
 def rollout(

@@ -30,6 +30,7 @@ from mlci.grids import Grid
 from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.simulate import EULER, RK4
 from mlci.spaces import Box, Floats, Ints
 from mlci.tabular import TabularModel, action_grid, discretize
 
@@ -38,6 +39,7 @@ _MOVES = ("successor", "reward", "allowed")
 _CROSSINGS = ("indices", "indptr")
 
 ESCAPES = "escapes"  # the safe set from constant controls; else it solves the equation (9)
+_INTEGRATORS = {"euler": EULER, "rk4": RK4}
 _MOST_BATCHES = 20  # of tasks, among which enough must cross the truth where only those count
 
 
@@ -141,7 +143,8 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
     if len(settings.constraint):  # where nothing is forbidden, everything is safe
         omega, omega_key = safe_set(settings, store)
         margin = border_margin(system, omega, dt) if margin is None else margin
-        safety_filter = SafetyFilter(system, omega, dt, margin, safety.width)
+        integrator = _INTEGRATORS[settings.demonstrations.integrator]
+        safety_filter = SafetyFilter(system, omega, dt, margin, safety.width, integrator)
 
     def compute() -> dict[str, np.ndarray]:
         trials = _trials(settings, omega, margin or 0.0)
@@ -215,6 +218,7 @@ def _skill(settings: Settings) -> dict[str, Any]:
         "goal_tolerance": demonstrator.goal_tolerance,
         "wind": demonstrator.wind,
         "limit": settings.model.control_box if demonstrator.clip else None,
+        "integrator": _INTEGRATORS[demonstrator.integrator],
     }
 
 

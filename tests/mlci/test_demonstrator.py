@@ -10,7 +10,7 @@ from mlci.ilqr import optimize
 from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
-from mlci.simulate import euler_step, rollout
+from mlci.simulate import RK4, euler_step, rollout
 from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator, Pendulum
 
@@ -144,6 +144,22 @@ def test_what_is_kept_obeys_the_dynamics_the_truth_and_the_task(study):
         speed = attempt.demonstration.states[:, 1]
         assert not np.any((angle > np.pi) & (angle < 1.2 * np.pi) & (speed > 0) & (speed < 1.2))
         assert np.max(np.abs(speed)) <= 6
+
+
+def test_demonstrator_moves_by_its_integrator_and_stays_out_of_the_truth(safe_set, safety_filter):
+    trials = draw(safe_set, trials=8, margin=safety_filter.margin)
+    exact = SafetyFilter(PENDULUM, safe_set, DT, safety_filter.margin, integrator=RK4)
+    attempts = demonstrate(PENDULUM, trials, TRUTHS, exact, dt=DT, integrator=RK4)
+    outcomes = [attempt.outcome for attempt in attempts]
+    assert Outcome.TRUTH_ENTERED not in outcomes
+    assert outcomes.count(Outcome.KEPT) >= 5
+    for attempt in attempts:
+        path = attempt.demonstration
+        again = rollout(PENDULUM, path.task.start, path.controls, DT)
+        np.testing.assert_allclose(path.states, again, atol=1e-12)
+        # The motion in which the truth is looked for leads from sample to sample.
+        ends = rollout(PENDULUM, path.states[:-1], path.controls[:, None], DT, 11)[:, -1]
+        np.testing.assert_allclose(path.states[1:], ends, atol=1e-9)
 
 
 def test_attempt_is_the_cheapest_that_can_be_kept():

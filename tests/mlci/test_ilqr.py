@@ -10,7 +10,7 @@ from mlci.ilqr import optimize
 from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
-from mlci.simulate import euler_step, rollout
+from mlci.simulate import EULER, RK4, euler_step, rollout
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator, Pendulum, System
 
@@ -134,7 +134,10 @@ def test_goal_without_winding_is_the_one_nearest_to_the_start():
     assert np.mean(turns[True] > 0.5) > 0.2
 
 
-def test_swing_costs_what_pontryagin_says():
+@pytest.fixture(scope="module")
+def swing_effort():
+    """Effort of the cheapest swing from (0.5, 0) to (3, 0) in 5 s, by Pontryagin's conditions."""
+
     # Minimum of int u^2: u = -q / 2, with costates p' = -q cos(theta), q' = -p.
     def motion(_, y):
         angle, speed, p, q = y
@@ -150,9 +153,12 @@ def test_swing_costs_what_pontryagin_says():
     fine = np.linspace(0, 5, 20_001)
     effort = np.trapezoid((exact.sol(fine)[3] / 2) ** 2, fine)
     assert effort == pytest.approx(2.3849, abs=1e-4)
+    return effort
 
+
+def test_swing_costs_what_pontryagin_says(swing_effort):
     found = solve_one(PENDULUM, [0.5, 0], [3, 0], np.zeros((500, 1)), iterations=60)
-    assert np.sum(found.controls**2) * DT == pytest.approx(effort, rel=0.01)
+    assert np.sum(found.controls**2) * DT == pytest.approx(swing_effort, rel=0.01)
     assert np.linalg.norm(found.states[0, -1] - [3, 0]) < 0.05
     applied = rollout(PENDULUM, [0.5, 0], found.controls[0], DT, step=euler_step)
     np.testing.assert_allclose(found.states[0], applied, atol=1e-12)
@@ -244,9 +250,9 @@ def test_swing_with_a_reward_of_its_own_is_the_one_that_pontryagin_says(system):
     assert np.max(np.abs(plain[:, 0] - controls[:-1:40])) > 0.1
 
     costs = []
-    for dt in (0.01, 0.005):
+    for dt in (0.02, 0.01):
         guess = np.zeros((round(5 / dt), 1))
-        options = {"goal_weight": 1e5, "iterations": 80}
+        options = {"goal_weight": 1e5, "iterations": 50}
         solution = solve_one(system, [0.5, 0], [3, 0], guess, dt, **options)
         costs.append(solution.cost[0])
         held = solution.controls[0, :, 0] - controls[: -1 : round(dt / 0.00025)]
@@ -309,6 +315,30 @@ def test_reward_of_states_alone_is_optimised():
     )
     np.testing.assert_allclose(solution.controls[0, :-1], 1.0)  # the last one moves no state
     assert solution.cost[0] == pytest.approx(-0.5 * (1 - DT))
+
+
+@pytest.mark.parametrize(
+    ("integrator", "order", "steps", "bias"),
+    # A held control is itself of the second order.
+    [(EULER, 1, (50, 100, 200), 0.02), (RK4, 2, (25, 50, 100), 2e-4)],
+    ids=["Euler", "Runge-Kutta"],
+)
+def test_effort_comes_closer_with_the_integrators_order(
+    swing_effort, integrator, order, steps, bias
+):
+    errors = []
+    for count in steps:
+        guess, dt = np.zeros((count, 1)), 5 / count
+        options = {"goal_weight": 1e5, "iterations": 100, "tolerance": 1e-12}
+        solution = solve_one(
+            PENDULUM, [0.5, 0], [3, 0], guess, dt, integrator=integrator, **options
+        )
+        errors.append(np.sum(solution.controls**2) * dt / swing_effort - 1)
+        again = rollout(PENDULUM, [0.5, 0], solution.controls[0], dt, step=integrator.step)
+        np.testing.assert_allclose(solution.states[0], again, atol=1e-12)
+    slope = -np.polyfit(np.log(steps), np.log(np.abs(errors)), 1)[0]
+    assert slope == pytest.approx(order, abs=0.2)
+    assert np.abs(errors[-1]) < bias
 
 
 @pytest.mark.parametrize(

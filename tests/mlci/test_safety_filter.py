@@ -7,7 +7,7 @@ from mlci.grids import Grid
 from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
-from mlci.simulate import euler_step
+from mlci.simulate import EULER, RK4, euler_step
 from mlci.systems import DoubleIntegrator, Pendulum
 
 PENDULUM = Pendulum()
@@ -140,15 +140,16 @@ def test_the_blend_rises_from_the_safe_to_the_nominal_control():
     assert share[halfway] == pytest.approx(0.5, abs=0.01)
 
 
-def test_linearize_matches_finite_differences_of_apply():
+@pytest.mark.parametrize(("integrator", "dt"), [(EULER, DT), (RK4, 0.1)])
+def test_linearize_matches_finite_differences_of_apply(integrator, dt):
     omega, step = safe_set(SIDE), 1e-6
-    safety = SafetyFilter(PENDULUM, omega, DT, 0.1, 0.4)
+    safety = SafetyFilter(PENDULUM, omega, dt, 0.1, 0.4, integrator)
     rng = np.random.default_rng(2)
     states = near_border(omega, 0.3, 400)
     controls = rng.uniform(-8, 8, (len(states), 1))
     by_state, by_control = safety.linearize(states, controls)
     # The interpolant has kinks at cell centres, and u* jumps: keep away from both.
-    position = (euler_step(PENDULUM, states, controls, DT) / omega.grid.widths) % 1.0 - 0.5
+    position = (integrator.step(PENDULUM, states, controls, dt) / omega.grid.widths) % 1.0 - 0.5
     smooth = np.all(np.abs(position) > 1e-3, axis=1)
     best = omega.safe_control(PENDULUM, states)
     for d in range(2):
@@ -165,6 +166,19 @@ def test_linearize_matches_finite_differences_of_apply():
         )
     change = safety.apply(states, controls + step) - safety.apply(states, controls - step)
     np.testing.assert_allclose(by_control[smooth, :, 0], change[smooth] / (2 * step), rtol=1e-5)
+
+
+def test_a_filter_looks_one_step_of_its_integrator_ahead():
+    omega, margin, dt = safe_set(SIDE), 0.1, 0.3  # long enough for the steps to part
+    states = near_border(omega, 0.3, 400)
+    controls = np.random.default_rng(3).uniform(-8, 8, (400, 1))
+    free = {}
+    for integrator in (EULER, RK4):
+        safety = SafetyFilter(PENDULUM, omega, dt, margin, integrator=integrator)
+        free[integrator] = (safety.apply(states, controls) == controls)[:, 0]
+        ahead = integrator.step(PENDULUM, states, controls, dt)
+        np.testing.assert_array_equal(free[integrator], omega.value(ahead) >= margin)
+    assert np.any(free[EULER] != free[RK4])
 
 
 def test_impossible_filters_are_refused():

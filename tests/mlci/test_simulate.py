@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mlci.simulate import euler_step, rk4_step, rollout, step_count
-from mlci.systems import Pendulum
+from mlci.differences import first_derivatives
+from mlci.simulate import EULER, RK4, euler_step, rk4_step, rollout, step_count
+from mlci.systems import Pendulum, TelescopingPendulum
 
 PENDULUM = Pendulum()
 START = np.array([1.0, -0.5])
@@ -40,6 +41,24 @@ def test_error_falls_with_the_integrators_order(step, order, substeps):
         errors.append(np.max(np.abs(path[::count] - exact)))
     slope = -np.polyfit(np.log(substeps), np.log(errors), 1)[0]
     assert slope == pytest.approx(order, abs=0.15)
+
+
+@pytest.mark.parametrize("integrator", [EULER, RK4], ids=["Euler", "Runge-Kutta"])
+def test_jacobians_of_a_step_are_those_that_differences_give(integrator):
+    leg, rng, dt = TelescopingPendulum(), np.random.default_rng(1), 0.3
+    states = rng.uniform(leg.space.bounds.lower, leg.space.bounds.upper, (20, 4))
+    controls = rng.uniform(-2, 2, (20, 2))
+    by_state, by_control = integrator.rate_jacobians(leg, states, controls, dt)
+    np.testing.assert_allclose(
+        np.eye(4) + dt * by_state,
+        first_derivatives(lambda moved: integrator.step(leg, moved, controls, dt), states),
+        atol=1e-8,
+    )
+    np.testing.assert_allclose(
+        dt * by_control,
+        first_derivatives(lambda moved: integrator.step(leg, states, moved, dt), controls),
+        atol=1e-8,
+    )
 
 
 def test_the_paths_of_a_batch_are_those_of_its_members():

@@ -176,6 +176,10 @@ class DemonstrationSettings:
         Flag,
         about("any number of turns may lead to a goal; false: only the way of at most half a turn"),
     ]
+    integrator: Annotated[
+        Literal["euler", "rk4"],
+        about("steps of the simulation: `euler`, as the paper's recordings, or `rk4`, Runge-Kutta"),
+    ]
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -17,6 +17,8 @@ from experiments.point import stages
 from experiments.point.run import run_point
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.store import Store
+from mlci.simulate import euler_step, rk4_step, rollout
+from mlci.systems import Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize
 
 register_plugins()
@@ -117,6 +119,10 @@ def test_choices_reach_the_demonstrator(tmp_path: Path) -> None:
     direct = stages.demonstrations(composed(*words, "demonstrations.wind=false"), store)
     turned = np.abs(direct.states[:, -1, 0] - direct.states[:, 0, 0])[direct.kept(16)]
     assert np.max(turned) < np.pi + 0.05
+    smooth = stages.demonstrations(composed(*words, "demonstrations.integrator=rk4"), store)
+    for trials, step in ((plain, euler_step), (smooth, rk4_step)):
+        paths = rollout(Pendulum(), trials.starts, trials.controls, 0.02, step=step)
+        np.testing.assert_allclose(trials.states, paths, atol=1e-10)
     safe, _ = stages.safe_set(composed(*words), store)
     careful = stages.demonstrations(composed(*words, "safety.margin=0.6"), store)
     assert np.min(safe.value(careful.starts)) >= 0.6
