@@ -246,8 +246,8 @@ def test_swing_with_a_reward_of_its_own_is_the_one_that_pontryagin_says(system):
     controls = system.control(path[3])
     cost = np.trapezoid(-system.running_reward(path[:2].T, controls[:, None]), fine)
     # What |u|^2 alone would choose costs more by far than the tolerances below.
-    plain = solve_one(PENDULUM, [0.5, 0], [3, 0], np.zeros((500, 1)), iterations=60).controls[0]
-    assert np.max(np.abs(plain[:, 0] - controls[:-1:40])) > 0.1
+    plain = solve_one(PENDULUM, [0.5, 0], [3, 0], np.zeros((100, 1)), 0.05, iterations=30)
+    assert np.max(np.abs(plain.controls[0, :, 0] - controls[:-1:200])) > 0.2
 
     costs = []
     for dt in (0.02, 0.01):

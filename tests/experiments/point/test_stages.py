@@ -17,7 +17,8 @@ from experiments.point import stages
 from experiments.point.run import run_point
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.store import Store
-from mlci.simulate import euler_step, rk4_step, rollout
+from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.simulate import EULER, RK4, rollout
 from mlci.systems import Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize
 
@@ -120,10 +121,17 @@ def test_choices_reach_the_demonstrator(tmp_path: Path) -> None:
     turned = np.abs(direct.states[:, -1, 0] - direct.states[:, 0, 0])[direct.kept(16)]
     assert np.max(turned) < np.pi + 0.05
     smooth = stages.demonstrations(composed(*words, "demonstrations.integrator=rk4"), store)
-    for trials, step in ((plain, euler_step), (smooth, rk4_step)):
+    for trials, integrator in ((plain, EULER), (smooth, RK4)):
+        step = integrator.step
         paths = rollout(Pendulum(), trials.starts, trials.controls, 0.02, step=step)
         np.testing.assert_allclose(trials.states, paths, atol=1e-10)
     safe, _ = stages.safe_set(composed(*words), store)
+    margin = border_margin(Pendulum(), safe, 0.02)
+    for trials, integrator in ((plain, EULER), (smooth, RK4)):
+        # What a filter has let through once passes again, if it looks ahead by the same steps.
+        once = SafetyFilter(Pendulum(), safe, 0.02, margin, integrator=integrator)
+        again = once.apply(trials.states[:, :-1], trials.controls)
+        np.testing.assert_array_equal(again, trials.controls)
     careful = stages.demonstrations(composed(*words, "safety.margin=0.6"), store)
     assert np.min(safe.value(careful.starts)) >= 0.6
     assert np.min(safe.value(plain.starts)) < 0.6
