@@ -45,7 +45,7 @@ dask=(hydra/launcher=dask hydra.launcher.jobs=4 hydra.launcher.scheduler=$addres
 touch "$HOLD"
 sweep "$work/results" "${dask[@]}" > "$work/first.log" 2>&1 &
 first=$!
-for _ in $(seq 120); do
+for _ in $(seq 480); do
     [ "$(attempts)" -ge 2 ] && break
     sleep 0.5
 done
@@ -74,7 +74,7 @@ os.execv(sys.argv[1], sys.argv[1:])' "$PYTHON" experiments/run.py -m scale=smoke
     system._target_=held.Held grid.shape=[8,8] study=stopped results="$work/stopped" "${dask[@]}" \
     > "$work/stopped.log" 2>&1 &
 stopped=$!
-for _ in $(seq 120); do
+for _ in $(seq 480); do
     [ -n "$(find "$work/stopped/points" -name attempt.json 2> /dev/null)" ] && break
     sleep 0.5
 done

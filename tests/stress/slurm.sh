@@ -81,7 +81,7 @@ slurm=(hydra/launcher=slurm hydra.launcher.jobs=4 hydra.launcher.array_paralleli
 touch "$HOLD"
 sweep "$work/results" "${slurm[@]}" > "$work/first.log" 2>&1 &
 first=$!
-for _ in $(seq 120); do
+for _ in $(seq 480); do
     [ "$(find "$work/results/points" -name attempt.json 2> /dev/null | wc -l)" -ge 2 ] && break
     sleep 0.5
 done

@@ -54,7 +54,7 @@ def records(folder: Path) -> list[dict]:
 
 def test_failed_points_fail_alone_and_are_run_again_when_asked(tmp_path: Path) -> None:
     sweep = ["-m", *faulty(tmp_path), "+system.fault=raise,none,exit,crash,hang,full,warn"]
-    sweep += ["study=s", "sweep.time_limit=2"]
+    sweep += ["study=s", "sweep.time_limit=6"]
     status, out, err = run(tmp_path, *sweep)
     assert status == 1
     assert "7 points: 7 missing; 7 to run" in out
@@ -77,7 +77,7 @@ def test_failed_points_fail_alone_and_are_run_again_when_asked(tmp_path: Path) -
     for where in [
         'raise ArithmeticError("the mass',
         "Fatal Python error: Abort",
-        "Timeout (0:00:02)",
+        "Timeout (0:00:06)",
     ]:
         assert where in err
     assert len(re.findall(r"in dynamics", err)) == 3
