@@ -1,8 +1,22 @@
-"""Evidence: from violation probabilities and violations to ranked constraints, (4)-(6) and (12).
+"""Evidence: from probabilities of avoiding and violations to ranked constraints, (4)-(6) and (12).
 
-Adding constraint i multiplies the likelihood of the demonstrations by prod_j 1 / (1 - Phi_i^j),
-one factor a demonstration (each has its own start and goal, and so its own Z), or by 0 if any of
-them violates i. The log of that factor is the gain L_i.
+Adding constraint i multiplies the likelihood of a demonstration that avoids i by 1 / alpha_i, where
+alpha_i = 1 - Phi_i is how probable it is that the unconstrained agent avoids i, and by 0 if the
+demonstration violates i. Each demonstration has its own start and goal, and so its own Z and alpha:
+the gain L_i is the sum of the logs.
+
+Two rates say how far the demonstrator may be from that; both are 0 in the paper.
+
+* **Model error** eta: with this probability a demonstration is of an agent whom the tabular model
+  does not describe, and that it avoids i says nothing. Then P(avoids i | no constraint) is
+  a_i = (1 - eta) alpha_i + eta, and one demonstration brings at most -log eta.
+* **Rule breaking** eps: with this probability the demonstrator ignores the constraint. Under
+  constraint i a demonstration xi then has the density (1 - eps) p(xi | xi avoids i) + eps p(xi),
+  whose ratio to p(xi) is
+
+      (1 - eps) [xi avoids i] / a_i + eps,
+
+  so that a violation costs log eps, and does not exclude i for ever.
 """
 
 from __future__ import annotations
@@ -16,17 +30,42 @@ from scipy.special import logsumexp
 from mlci.spaces import Bools, Floats, Ints
 
 
+@dataclass(frozen=True)
+class Rates:
+    """How far demonstrators may be from the tabular model and from the constraint.
+
+    Attributes:
+        model_error: eta, share of demonstrations that say nothing by what they avoid.
+        rule_breaking: eps, share of demonstrations that ignore the constraint.
+
+    Raises:
+        ValueError: a rate outside [0, 1).
+    """
+
+    model_error: float = 0.0
+    rule_breaking: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, rate in vars(self).items():
+            if not 0 <= rate < 1:
+                raise ValueError(f"the rate {name} must lie in [0, 1), not {rate}")
+
+
+PAPER = Rates()
+
+
 @dataclass(frozen=True, eq=False)
 class Ranking:
     """Constraint hypotheses ranked by likelihood.
 
     Attributes:
-        gain: (C,) L_i = -sum_j log(1 - Phi_i^j) [nat]. +inf if some tabular demonstration cannot
-            avoid i; -inf if i is not feasible.
+        gain: (C,) L_i [nat]: how much more likely the demonstrations are under constraint i. -inf
+            for what a demonstration violates, if nobody breaks rules; +inf for what some tabular
+            agent cannot avoid although its demonstration does, if the model has no error.
         feasible: (C,) whether no demonstration violates i.
         rank: (C,) 1 is most likely. Ties share the mean of their ranks, so that a hypothesis that
             explains nothing is not flattered by all the others that explain nothing; those that
-            are not feasible tie in the last places.
+            are impossible tie in the last places.
         order: (C,) indices by rank, ties by index.
         posterior: (C,) probability of each being the one constraint.
         posterior_none: probability that there is none.
@@ -40,10 +79,39 @@ class Ranking:
     posterior_none: float
 
 
-def log_likelihood_gain(phi: ArrayLike) -> Floats:
-    """-log(1 - Phi) (..., C) [nat] of each demonstration: the terms of L_i, equation (6)."""
+def log_evidence(avoidance: ArrayLike, violated: ArrayLike, rates: Rates = PAPER) -> Floats:
+    """Log likelihood ratio (N, C) [nat] of constraint i against none: the terms of L_i in (6).
+
+    Args:
+        avoidance: (N, C) alpha, probability that the unconstrained agent avoids a region; 1 where
+            a demonstration says nothing by avoiding it.
+        violated: (N, C) which regions each demonstration violates.
+        rates: model error and rule breaking.
+
+    Raises:
+        ValueError: shapes that disagree, or probabilities outside [0, 1].
+    """
+    alpha, crossed = np.asarray(avoidance, dtype=float), np.asarray(violated, dtype=bool)
+    if alpha.ndim != 2 or alpha.shape != crossed.shape:
+        raise ValueError(
+            f"avoidance and violated need (N, C) each, not {alpha.shape} and {crossed.shape}"
+        )
+    if not np.all((alpha >= 0) & (alpha <= 1)):
+        raise ValueError("probabilities of avoiding must lie in [0, 1]")
+    eta, eps = rates.model_error, rates.rule_breaking
     with np.errstate(divide="ignore"):
-        return -np.log1p(-np.asarray(phi, dtype=float))
+        # log((1 - eps) / a + eps), without the overflow of 1 / a.
+        of_avoiding = np.log((1 - eps) + eps * ((1 - eta) * alpha + eta)) - np.log(
+            (1 - eta) * alpha + eta
+        )
+        return np.where(crossed, np.log(eps), of_avoiding)
+
+
+def total_gain(evidence: Floats) -> Floats:
+    """L_i (..., C) of log evidence (..., N, C): its sum; -inf where a violation excludes i."""
+    with np.errstate(invalid="ignore"):
+        gain = np.sum(evidence, axis=-2)
+    return np.where(np.any(evidence == -np.inf, axis=-2), -np.inf, gain)
 
 
 def rank_scores(gain: ArrayLike, feasible: ArrayLike) -> Floats:
@@ -59,33 +127,28 @@ def rank_scores(gain: ArrayLike, feasible: ArrayLike) -> Floats:
 
 
 def rank_constraints(
-    phi: ArrayLike,
+    avoidance: ArrayLike,
     violated: ArrayLike,
     prior_none: float = 0.5,
     prior: ArrayLike | None = None,
+    rates: Rates = PAPER,
 ) -> Ranking:
     """Rank the hypotheses, equations (4) to (6).
 
     Args:
-        phi: (N', C) violation probabilities without the constraint, one row for each
-            demonstration whose goal the tabular MDP can reach.
-        violated: (N, C) which hypotheses each demonstration violates; those that the tabular MDP
-            cannot follow refute hypotheses all the same.
+        avoidance: (N, C) as of `log_evidence`.
+        violated: (N, C) which hypotheses each demonstration violates.
         prior_none: prior probability that there is no constraint.
         prior: (C,) prior weights of the hypotheses; equal by default.
+        rates: model error and rule breaking.
 
     Raises:
         ValueError: shapes that disagree, probabilities outside [0, 1].
     """
-    phi, violated = np.asarray(phi, dtype=float), np.asarray(violated, dtype=bool)
-    if phi.ndim != 2 or violated.ndim != 2 or phi.shape[1] != violated.shape[1]:
-        raise ValueError(f"phi and violated need (N, C) each, not {phi.shape}, {violated.shape}")
-    if not np.all((phi >= 0) & (phi <= 1)):
-        raise ValueError("violation probabilities must lie in [0, 1]")
-    feasible = ~np.any(violated, axis=0)
-    gain = np.where(feasible, np.sum(log_likelihood_gain(phi), axis=0), -np.inf)
-    rank = rank_scores(gain, feasible)
+    gain = total_gain(log_evidence(avoidance, violated, rates))
+    rank = rank_scores(gain, gain > -np.inf)
     each, none = posterior(gain, prior_none, prior)
+    feasible = ~np.any(np.asarray(violated, dtype=bool), axis=0)
     return Ranking(gain, feasible, rank, np.argsort(rank, kind="stable"), each, none)
 
 
@@ -124,7 +187,7 @@ def posterior(
     return probability[:-1], float(probability[-1])
 
 
-def confidence(prior: float, phi: ArrayLike) -> float:
+def confidence(prior: float, avoidance: ArrayLike) -> float:
     """(12), corrected: P(C | A_N) = p / (p + (1 - p) prod_j (1 - Phi^j)).
 
     For one hypothesis that was fixed before the demonstrations were seen, and that none of them
@@ -132,17 +195,17 @@ def confidence(prior: float, phi: ArrayLike) -> float:
 
     Args:
         prior: p, the probability that the constraint is there.
-        phi: (N,) its violation probability for each demonstration.
+        avoidance: (N,) alpha = 1 - Phi, its probability of being avoided in each demonstration.
     """
     if not 0 <= prior <= 1:
         raise ValueError(f"a prior probability lies in [0, 1], not {prior}")
     if prior == 0:
         return 0.0
-    coincidence = float(np.exp(-np.sum(log_likelihood_gain(phi))))
+    coincidence = float(np.prod(np.asarray(avoidance, dtype=float)))
     return prior / (prior + (1 - prior) * coincidence)
 
 
-def printed_confidence(prior: float, phi: ArrayLike) -> float:
+def printed_confidence(prior: float, avoidance: ArrayLike) -> float:
     """(12) as it is printed: p / (p - (1 - p) prod_j (1 - Phi^j)); wrong, for comparison only.
 
     It exceeds 1 wherever it is positive, grows without bound as the product comes near p / (1 - p),
@@ -150,13 +213,13 @@ def printed_confidence(prior: float, phi: ArrayLike) -> float:
 
     Args:
         prior: p, the probability that the constraint is there.
-        phi: (N,) its violation probability for each demonstration.
+        avoidance: (N,) alpha = 1 - Phi, its probability of being avoided in each demonstration.
 
     Returns:
         What the formula gives; infinite where it divides by 0.
     """
     if not 0 <= prior <= 1:
         raise ValueError(f"a prior probability lies in [0, 1], not {prior}")
-    coincidence = float(np.exp(-np.sum(log_likelihood_gain(phi))))
+    coincidence = float(np.prod(np.asarray(avoidance, dtype=float)))
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.float64(prior) / (prior - (1 - prior) * coincidence))

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mlci.evidence import Ranking, rank_constraints
+from mlci.evidence import PAPER, Ranking, Rates, log_evidence, rank_constraints
 from mlci.regions import Regions
 from mlci.spaces import Bools, Floats, Ints
 
@@ -23,12 +23,13 @@ class Inference:
     Attributes:
         hypotheses: the C regions.
         names: (N,) names of the demonstrations.
-        phi: (N, C) probability that the task's unconstrained agent violates a hypothesis; 0 for a
-            task that the tabular model cannot do, whose demonstration refutes hypotheses and
-            supports none.
+        avoidance: (N, C) alpha, probability that the task's unconstrained agent avoids a
+            hypothesis; 1 where the demonstration says nothing by avoiding it, as where the tabular
+            model cannot do the task.
         violated: (N, C) which hypotheses a demonstration violates.
         reachable: (N,) whether the tabular model can do the task.
         prior_none: prior probability that there is no constraint.
+        rates: model error and rule breaking of the demonstrators.
 
     Raises:
         ValueError: shapes that disagree.
@@ -36,10 +37,11 @@ class Inference:
 
     hypotheses: Regions
     names: tuple[str, ...]
-    phi: Floats
+    avoidance: Floats
     violated: Bools
     reachable: Bools
     prior_none: float = 0.5
+    rates: Rates = PAPER
 
     def __post_init__(self) -> None:
         shape = len(self.names), len(self.hypotheses)
@@ -47,15 +49,25 @@ class Inference:
             self.phi.shape == self.violated.shape == shape == (*self.reachable.shape, shape[1])
         ):
             raise ValueError(
-                f"{shape[0]} demonstrations and {shape[1]} hypotheses do not fit phi "
-                f"{self.phi.shape}, violated {self.violated.shape}, reachable "
+                f"{shape[0]} demonstrations and {shape[1]} hypotheses do not fit avoidance "
+                f"{self.avoidance.shape}, violated {self.violated.shape}, reachable "
                 f"{self.reachable.shape}"
             )
 
     @cached_property
     def ranking(self) -> Ranking:
         """Gain, rank and posterior of each hypothesis, equations (4) to (6)."""
-        return rank_constraints(self.phi[self.reachable], self.violated, self.prior_none)
+        return rank_constraints(self.avoidance, self.violated, self.prior_none, rates=self.rates)
+
+    @property
+    def phi(self) -> Floats:
+        """(N, C) probability that the unconstrained agent violates a hypothesis."""
+        return 1.0 - self.avoidance
+
+    @cached_property
+    def evidence(self) -> Floats:
+        """(N, C) log evidence of each demonstration for each hypothesis [nat]."""
+        return log_evidence(self.avoidance, self.violated, self.rates)
 
     @property
     def gain(self) -> Floats:
@@ -83,7 +95,7 @@ class Inference:
         return replace(
             self,
             names=tuple(np.array(self.names, dtype=object)[part]),
-            phi=self.phi[part],
+            avoidance=self.avoidance[part],
             violated=self.violated[part],
             reachable=self.reachable[part],
         )

@@ -23,7 +23,7 @@ from mlci.tabular import TabularModel
 
 _CELLS_AT_ONCE = 1 << 12  # whose moves a step of work holds
 _UNEVEN = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
-PHI_BYTES = 1 << 29  # of violation probabilities held at once, else regions go block by block
+ALPHA_BYTES = 1 << 29  # of probabilities held at once, else regions go block by block
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,26 +102,29 @@ class TrajectoryDistribution:
         cells = np.flatnonzero(self.log_z[t] > -np.inf)
         return cells, _move_probabilities(self.model, self.log_z, t, cells)
 
-    def violation_probabilities(self) -> Floats:
-        """Phi_(i,T) (C,): the probability that a trajectory crosses region i.
+    def avoidance_probabilities(self) -> Floats:
+        """alpha_i (C,): the probability that a trajectory does not cross region i.
 
-        phi_t^i(s) = sum over moves of pi_t(move | s) [1 if the move crosses i, else
-        phi_(t+1)^i(s')], backwards from phi_T = 0. Computed as sum of pi_t phi_(t+1)^i(s') over all
-        moves, those with one successor merged, and then pi_t (1 - phi_(t+1)^i(s')) added for each
-        move that crosses i: all terms are at least 0, so nothing cancels.
+        alpha_t^i(s) = sum over the moves that do not cross i of pi_t(move | s) alpha_(t+1)^i(s'),
+        backwards from alpha_T = 1. Nothing is subtracted, so that a region which no trajectory
+        avoids has exactly 0, and -log alpha is exact where 1 - alpha would round to 1.
 
         Raises:
             ValueError: no trajectory reaches a goal.
         """
-        self._require_possible("Phi is not defined")
+        self._require_possible("probabilities are not defined")
         regions = len(self.model.regions)
         support = int(np.max(np.sum(self.log_z > -np.inf, axis=1)))
-        blocks = min(regions, -(-regions * 2 * 8 * support // PHI_BYTES))
+        blocks = min(regions, -(-regions * 2 * 8 * support // ALPHA_BYTES))
         edges = np.linspace(0, regions, max(1, blocks) + 1).astype(int)
-        phi = np.empty(regions)
+        alpha = np.empty(regions)
         for first, last in pairwise(edges):
-            phi[first:last] = _phi_of_regions(self.model, self.log_z, first, last)
-        return np.minimum(phi, 1.0)
+            alpha[first:last] = _alpha_of_regions(self.model, self.log_z, first, last)
+        return np.minimum(alpha, 1.0)
+
+    def violation_probabilities(self) -> Floats:
+        """Phi_(i,T) = 1 - alpha_i (C,): the probability that a trajectory crosses region i."""
+        return 1.0 - self.avoidance_probabilities()
 
     def sample(self, count: int, rng: np.random.Generator) -> tuple[Ints, Ints]:
         """Draw trajectories by following the soft optimal policy.
@@ -179,54 +182,65 @@ def _soft_bellman_backup(model: TabularModel, cells: list[Ints], goal: Ints) -> 
     return log_z
 
 
-def _phi_of_regions(model: TabularModel, log_z: Floats, first: int, last: int) -> Floats:
-    """Phi of the regions from `first` to before `last`, of the one cell that log_z starts in."""
+def _alpha_of_regions(model: TabularModel, log_z: Floats, first: int, last: int) -> Floats:
+    """alpha of the regions from `first` to before `last`, of the one cell that log_z starts in."""
     steps = len(log_z) - 1
     row_of = np.zeros(model.states, dtype=np.int64)
     cells_after = np.flatnonzero(log_z[steps] > -np.inf)
-    phi = np.zeros((len(cells_after), last - first))
+    alpha = np.ones((len(cells_after), last - first))
     for t in reversed(range(steps)):
         row_of[:] = -1
         row_of[cells_after] = np.arange(len(cells_after))
         cells = np.flatnonzero(log_z[t] > -np.inf)
-        phi_after, phi = phi, np.empty((len(cells), last - first))
+        alpha_after, alpha = alpha, np.empty((len(cells), last - first))
         row = 0
         for here in _parts(model, cells):
-            now = phi[row : row + len(here)]
-            now[:] = _phi_one_step_back(model, log_z, t, here, row_of, phi_after, first)
+            now = alpha[row : row + len(here)]
+            now[:] = _alpha_one_step_back(model, log_z, t, here, row_of, alpha_after, first)
             row += len(here)
         cells_after = cells
-    return phi[0]
+    return alpha[0]
 
 
-def _phi_one_step_back(
+def _alpha_one_step_back(
     model: TabularModel,
     log_z: Floats,
     t: int,
     cells: Ints,
     row_of: Ints,
-    phi_after: Floats,
+    alpha_after: Floats,
     first: int,
 ) -> Floats:
-    """phi_t (Q, C') of some cells, from phi_(t+1) (Q', C'), whose rows `row_of` (S,) gives."""
-    merged, last = model.merged, first + phi_after.shape[1]
+    """alpha_t (Q, C') of some cells, from alpha_(t+1) (Q', C'), whose rows `row_of` (S,) gives.
+
+    First the sum over all moves, as a product; then, for the cells and regions that some move
+    crosses, the sum over the others anew.
+    """
+    merged, last = model.merged, first + alpha_after.shape[1]
     move, ends = _ranges(merged.begins, cells)
     value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
     probability = np.exp(value - np.repeat(log_z[t, cells], np.diff(ends)))
     probability /= np.repeat(np.add.reduceat(probability, ends[:-1]), np.diff(ends))
     # A successor outside the support has probability 0: whichever row stands for it.
     column = np.maximum(row_of[merged.successor[move]], 0)
-    shape = len(cells), len(phi_after)
-    phi = sparse.csr_matrix((probability, column, ends), shape=shape) @ phi_after
+    shape = len(cells), len(alpha_after)
+    alpha = sparse.csr_matrix((probability, column, ends), shape=shape) @ alpha_after
     owner, entry, region = _of_cells(
         merged.crossing_begins, merged.crossing_region, cells, first, last
     )
-    place = merged.crossing_move[entry] - merged.begins[cells[owner]] + ends[owner]
-    lacking = probability[place] * (1.0 - phi_after[column[place], region])
-    np.add.at(phi.reshape(-1), owner * (last - first) + region, lacking)
+    if len(owner):
+        pair, which = np.unique(owner * (last - first) + region, return_inverse=True)
+        cell_of, region_of = np.divmod(pair, last - first)
+        # All moves of the cell of each pair, one pair after the other, without those that cross.
+        every, begins = _ranges(ends, cell_of)
+        weight = probability[every]
+        place = merged.crossing_move[entry] - merged.begins[cells[owner]]
+        weight[begins[which] + place] = 0.0
+        weight *= alpha_after[column[every], np.repeat(region_of, np.diff(begins))]
+        alpha[cell_of, region_of] = np.add.reduceat(weight, begins[:-1])
     owner, _, region = _of_cells(merged.certain_begins, merged.certain_region, cells, first, last)
-    phi[owner, region] = 1.0
-    return phi
+    alpha[owner, region] = 0.0
+    return alpha
 
 
 def _of_cells(

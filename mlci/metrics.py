@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import comb
 
-from mlci.evidence import log_likelihood_gain, rank_scores
+from mlci.evidence import rank_scores, total_gain
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 
 
@@ -70,13 +70,11 @@ def random_subsets(
     return [orders[:, :size] for size in range(1, min(largest, population) + 1)]
 
 
-def truth_ranks(phi: ArrayLike, violated: ArrayLike, truth: Bools, subsets: Ints) -> Floats:
+def truth_ranks(evidence: Floats, truth: Bools, subsets: Ints) -> Floats:
     """Rank of the truth after the demonstrations of each subset, the measure of Fig. 5.
 
     Args:
-        phi: (N, C) violation probabilities without a constraint, 0 in the row of a demonstration
-            that the tabular MDP cannot follow: it refutes hypotheses but supports none.
-        violated: (N, C) what the demonstrations violate.
+        evidence: (N, C) log evidence of each demonstration for each hypothesis [nat].
         truth: (C,) which hypotheses the true constraint covers; the best ranked one counts.
         subsets: (B, k) indices of demonstrations.
 
@@ -85,18 +83,15 @@ def truth_ranks(phi: ArrayLike, violated: ArrayLike, truth: Bools, subsets: Ints
     """
     if not np.any(truth):
         return np.full(len(subsets), np.nan)
-    gain = _subset_gains(phi, violated, subsets)
+    gain = total_gain(evidence[subsets])
     return np.asarray(np.min(rank_scores(gain, gain > -np.inf)[:, truth], axis=1))
 
 
-def top_chances(
-    phi: ArrayLike, violated: ArrayLike, good: Bools, subsets: Ints, top: int
-) -> Floats:
+def top_chances(evidence: Floats, good: Bools, subsets: Ints, top: int) -> Floats:
     """Whether the `top` best hypotheses of each subset are all good, the measure of Fig. 7.
 
     Args:
-        phi: (N, C) as for `truth_ranks`.
-        violated: (N, C) what the demonstrations violate.
+        evidence: (N, C) as for `truth_ranks`.
         good: (C,) which hypotheses count, such as those that overlap the truth.
         subsets: (B, k) indices of demonstrations.
         top: how many of the best there must be.
@@ -105,16 +100,9 @@ def top_chances(
         (B,) 1 or 0; between them where the last places are tied: the chance that all are good if
         the tie is broken at random.
     """
-    loss = -_subset_gains(phi, violated, subsets)
+    loss = -total_gain(evidence[subsets])
     last = np.sort(loss, axis=1)[:, [top - 1]]
     before, tied = loss < last, loss == last
     places = top - np.sum(before, axis=1)
     fitting, all_ways = (comb(np.sum(part, axis=1), places) for part in (tied & good, tied))
     return np.asarray(np.all(good | ~before, axis=1) * fitting / all_ways)
-
-
-def _subset_gains(phi: ArrayLike, violated: ArrayLike, subsets: Ints) -> Floats:
-    """(B, C) L_i after the demonstrations of each subset; -inf of what one of them violates."""
-    gain = np.sum(log_likelihood_gain(phi)[subsets], axis=1)
-    refuted = np.any(np.asarray(violated, dtype=bool)[subsets], axis=1)
-    return np.where(refuted, -np.inf, gain)

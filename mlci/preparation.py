@@ -15,6 +15,7 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from mlci.demonstrations import Demonstration, Task
+from mlci.evidence import PAPER, Rates
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions, as_mask
@@ -29,7 +30,8 @@ class PreparedInference:
     Attributes:
         tasks: the N tasks.
         hypotheses: the C hypotheses.
-        phi: (N, C) violation probabilities without a constraint; 0 where not reachable.
+        avoidance: (N, C) probability that the unconstrained agent avoids a hypothesis; 1 where it
+            says nothing.
         reachable: (N,) whether the tabular model can do the task.
 
     Raises:
@@ -38,15 +40,15 @@ class PreparedInference:
 
     tasks: tuple[Task, ...]
     hypotheses: Regions
-    phi: Floats
+    avoidance: Floats
     reachable: Bools
 
     def __post_init__(self) -> None:
         shape = len(self.tasks), len(self.hypotheses)
-        if self.phi.shape != shape or self.reachable.shape != shape[:1]:
+        if self.avoidance.shape != shape or self.reachable.shape != shape[:1]:
             raise ValueError(
-                f"phi {self.phi.shape} and reachable {self.reachable.shape} do not fit {shape[0]} "
-                f"tasks and {shape[1]} hypotheses"
+                f"avoidance {self.avoidance.shape} and reachable {self.reachable.shape} do not fit "
+                f"{shape[0]} tasks and {shape[1]} hypotheses"
             )
 
     def infer(
@@ -56,6 +58,7 @@ class PreparedInference:
         *,
         names: Sequence[str] = (),
         prior_none: float = 0.5,
+        rates: Rates = PAPER,
     ) -> Inference:
         """Rank the hypotheses by the demonstrations that have arrived, equations (4) to (6).
 
@@ -65,6 +68,7 @@ class PreparedInference:
                 done; by default each task was done once, in order.
             names: of the demonstrations; their numbers by default.
             prior_none: prior probability that there is no constraint.
+            rates: model error and rule breaking of the demonstrators.
 
         Raises:
             ValueError: a task that is not known, or not one task and name for each path.
@@ -83,10 +87,11 @@ class PreparedInference:
         return Inference(
             self.hypotheses,
             labels,
-            self.phi[numbers],
+            self.avoidance[numbers],
             _violations(self.hypotheses, paths),
             self.reachable[numbers],
             prior_none,
+            rates,
         )
 
 
@@ -96,6 +101,7 @@ def infer(
     *,
     hypotheses: ArrayLike | None = None,
     prior_none: float = 0.5,
+    rates: Rates = PAPER,
     round_horizon: bool = False,
     n_jobs: int = 1,
     progress: Progress | None = None,
@@ -107,6 +113,7 @@ def infer(
         demonstrations: N demonstrations, each with a task of its own.
         hypotheses: (C,) mask over the model's regions; None takes all.
         prior_none: prior probability that there is no constraint.
+        rates: model error and rule breaking of the demonstrators.
         round_horizon: take the nearest number of time steps where dt does not divide a duration.
         n_jobs: tasks that are worked on at once; -1 is one a core. The result is the same.
         progress: called with how many tasks are done, and of how many.
@@ -127,7 +134,7 @@ def infer(
     names = [
         demonstration.name or str(number) for number, demonstration in enumerate(demonstrations)
     ]
-    return prepared.infer(paths, names=names, prior_none=prior_none)
+    return prepared.infer(paths, names=names, prior_none=prior_none, rates=rates)
 
 
 def prepare(
@@ -149,24 +156,26 @@ def prepare(
     distributions = [
         TrajectoryDistribution.of_task(model, task, round_horizon=round_horizon) for task in tasks
     ]
-    phi, reachable = np.zeros((len(tasks), count)), np.zeros(len(tasks), dtype=bool)
+    avoidance, reachable = np.ones((len(tasks), count)), np.zeros(len(tasks), dtype=bool)
     if tasks:
         _ = model.merged  # once for all tasks and processes
     work = Parallel(n_jobs=n_jobs, return_as="generator")(
-        delayed(_violation_probabilities)(distribution) for distribution in distributions
+        delayed(_avoidance_probabilities)(distribution) for distribution in distributions
     )
     for j, (is_possible, probabilities) in enumerate(work):
-        reachable[j], phi[j] = is_possible, probabilities
+        reachable[j], avoidance[j] = is_possible, probabilities
         if progress is not None:
             progress(j + 1, len(tasks))
-    return PreparedInference(tuple(tasks), model.regions.select(mask), phi[:, mask], reachable)
+    return PreparedInference(
+        tuple(tasks), model.regions.select(mask), avoidance[:, mask], reachable
+    )
 
 
-def _violation_probabilities(distribution: TrajectoryDistribution) -> tuple[bool, Floats]:
-    """Whether a task can be done, and Phi (C,) of it, 0 if it cannot."""
+def _avoidance_probabilities(distribution: TrajectoryDistribution) -> tuple[bool, Floats]:
+    """Whether a task can be done, and alpha (C,) of it, 1 if it cannot."""
     if distribution.is_possible:
-        return True, distribution.violation_probabilities()
-    return False, np.zeros(len(distribution.model.regions))
+        return True, distribution.avoidance_probabilities()
+    return False, np.ones(len(distribution.model.regions))
 
 
 def _violations(hypotheses: Regions, paths: Sequence[ArrayLike]) -> Bools:

@@ -6,7 +6,7 @@ import math
 import os
 
 from experiments.config.settings import ModelSettings, Settings
-from mlci.maxent import PHI_BYTES
+from mlci.maxent import ALPHA_BYTES
 
 # Measured on points of 0.4 to 4 million moves, and `python -m tests.benchmark` compares: a move has
 # successor, reward, its place among the cell's successors and the regions that it crosses, and most
@@ -29,7 +29,7 @@ def expected_memory(settings: ModelSettings) -> float:
         float(cells) * moves * _BYTES_A_MOVE
         + float(cells) * steps * _BYTES_A_STEP
         + float(hypotheses) * _BYTES_A_HYPOTHESIS
-        + min(PHI_BYTES, float(cells) * hypotheses * 16)
+        + min(ALPHA_BYTES, float(cells) * hypotheses * 16)
         + _BYTES_AT_REST
     )
 

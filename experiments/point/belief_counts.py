@@ -86,10 +86,10 @@ def _beliefs(inference: Inference, truth: Bools) -> Iterator[tuple[str, Floats, 
     best = int(ranking.order[0])
     if not ranking.feasible[best]:
         return
-    right, phi = truth[[best]], inference.phi[inference.reachable, best]
+    right, avoidance = truth[[best]], inference.avoidance[:, best]
     yield "selected", ranking.posterior[[best]], right
-    yield "corrected", np.array([confidence(prior, phi)]), right
-    yield "printed", np.array([printed_confidence(prior, phi)]), right
+    yield "corrected", np.array([confidence(prior, avoidance)]), right
+    yield "printed", np.array([printed_confidence(prior, avoidance)]), right
 
 
 def _binned(probability: Floats, right: Bools) -> Iterator[dict[str, float]]:
@@ -112,7 +112,7 @@ def _model_set(
     """Demonstrations from the tabular model under the truth, up to the first that there is not."""
     world = 0 if settings.truth.cell is None else settings.truth.cell + 1
     rng = stream(settings.seed, Purpose.MODEL_DEMONSTRATIONS, world, number)
-    phi, violated = [], []
+    avoidance, violated = [], []
     for _ in range(max(settings.calibration.demonstrations)):
         distribution = _possible_task(settings, point.model, rng)
         under_truth = TrajectoryDistribution(
@@ -122,14 +122,14 @@ def _model_set(
             break
         cells, moves = under_truth.sample(1, rng)
         violated.append(_crossed(point.model, cells[0], moves[0])[point.hypotheses])
-        phi.append(distribution.violation_probabilities()[point.hypotheses])
-    shape = len(phi), len(point.inference.hypotheses)
+        avoidance.append(distribution.avoidance_probabilities()[point.hypotheses])
+    shape = len(avoidance), len(point.inference.hypotheses)
     return Inference(
         point.inference.hypotheses,
-        tuple(map(str, range(len(phi)))),
-        np.reshape(phi, shape),
+        tuple(map(str, range(len(avoidance)))),
+        np.reshape(avoidance, shape),
         np.reshape(violated, shape).astype(bool),
-        np.ones(len(phi), dtype=bool),
+        np.ones(len(avoidance), dtype=bool),
         point.inference.prior_none,
     )
 

@@ -25,10 +25,10 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
     truth = hypotheses.inside(constraint)
     good = {"overlap": hypotheses.overlaps(constraint), "inside": truth}
     compared = [top for top in BEST if top <= len(hypotheses)] if len(constraint) else []
-    ranks, evidence = settings.ranks, (inference.phi, inference.violated)
+    ranks, evidence = settings.ranks, inference.evidence
     rows = []
     for subsets in random_subsets(len(inference.names), ranks.demonstrations, ranks.subsets, rng):
-        rank = truth_ranks(*evidence, truth, subsets)
+        rank = truth_ranks(evidence, truth, subsets)
         in_top = (rank <= ranks.top).astype(int) if truth.any() else np.nan
         rows.append(
             pd.DataFrame(
@@ -39,7 +39,7 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
                     "rank": rank,
                     f"share_top_{ranks.top}": in_top,
                     **{
-                        f"top_{top}_{name}": top_chances(*evidence, which, subsets, top)
+                        f"top_{top}_{name}": top_chances(evidence, which, subsets, top)
                         if top in compared
                         else np.nan
                         for name, which in good.items()
@@ -55,9 +55,9 @@ def ranking_table(inference: Inference) -> pd.DataFrame:
     """A row a hypothesis: its box, gain, rank and probabilities."""
     ranking, hypotheses = inference.ranking, inference.hypotheses
     prior = (1 - inference.prior_none) / len(hypotheses)
-    phi = inference.phi[inference.reachable]
     certainty = [
-        confidence(prior, phi[:, i]) if ranking.feasible[i] else 0.0 for i in range(len(hypotheses))
+        confidence(prior, inference.avoidance[:, i]) if ranking.feasible[i] else 0.0
+        for i in range(len(hypotheses))
     ]
     return pd.DataFrame(
         {

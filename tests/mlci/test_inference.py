@@ -58,13 +58,13 @@ def assert_same(one: Ranking, other: Ranking) -> None:
 
 
 def by_hand(model: TabularModel, demonstrations: list[Demonstration], prior_none: float) -> Ranking:
-    phi = []
-    for each in demonstrations:
+    avoidance = np.ones((len(demonstrations), len(HYPOTHESES)))
+    for row, each in zip(avoidance, demonstrations, strict=True):
         distribution = TrajectoryDistribution.of_task(model, each.task)
         if distribution.is_possible:
-            phi.append(distribution.violation_probabilities())
+            row[:] = distribution.avoidance_probabilities()
     violated = [HYPOTHESES.violated_by(each.states) for each in demonstrations]
-    return rank_constraints(phi, violated, prior_none)
+    return rank_constraints(avoidance, violated, prior_none)
 
 
 def test_infer_is_the_ranking_of_each_task_alone(model: TabularModel) -> None:
@@ -94,7 +94,7 @@ def test_any_number_of_jobs_gives_the_same_bits(model: TabularModel) -> None:
     fresh, calls = replace(model), []
     in_parallel = prepare(fresh, TASKS, n_jobs=2, progress=lambda *count: calls.append(count))
     alone = prepare(model, TASKS)
-    np.testing.assert_array_equal(in_parallel.phi, alone.phi)
+    np.testing.assert_array_equal(in_parallel.avoidance, alone.avoidance)
     np.testing.assert_array_equal(in_parallel.reachable, alone.reachable)
     assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
@@ -127,7 +127,7 @@ def hand_made() -> Inference:
     return Inference(
         Regions.from_boxes(SYSTEM.space, boxes, ["left", "middle", "right"]),
         ("first", "second"),
-        np.array([[0.5, 0.75, 1.0], [0.0, 0.0, 0.0]]),
+        np.array([[0.5, 0.25, 0.0], [1.0, 1.0, 1.0]]),
         np.array([[True, False, False], [False, False, False]]),
         np.array([True, False]),
     )
@@ -153,7 +153,7 @@ def test_repr_and_summary_say_what_was_inferred_and_what_is_doubtful() -> None:
     assert "cannot reach the goal of second" in text
     assert "cannot avoid right: their gain is infinite" in text
     many = Inference(
-        HYPOTHESES, ("a",), np.zeros((1, 100)), np.zeros((1, 100), bool), np.ones(1, bool)
+        HYPOTHESES, ("a",), np.ones((1, 100)), np.zeros((1, 100), bool), np.ones(1, bool)
     )
     assert many.warnings == []
     assert [len(words.splitlines()) for words in (repr(many), many.summary())] == [7, 12]
@@ -171,19 +171,21 @@ def test_wrong_input_is_refused(model: TabularModel, prepared: PreparedInference
         with pytest.raises(ValueError, match=rf"numbered 0 to 3, not \[{wrong}\]"):
             prepared.infer([path], [wrong])
     fewer = Regions.from_grid(SYSTEM.space, (5, 5))
-    with pytest.raises(ValueError, match=r"phi \(4, 100\) .* do not fit 4 tasks and 25 hypotheses"):
+    with pytest.raises(
+        ValueError, match=r"avoidance \(4, 100\) .* do not fit 4 tasks and 25 hypotheses"
+    ):
         replace(prepared, hypotheses=fewer)
     with pytest.raises(ValueError, match="mask over 100 regions"):
         infer(model, [demonstration(0, 0)], hypotheses=[True])
     inference = infer(model, [demonstration(0, 0)])
     for field, value in {
         "names": ("a", "b"),
-        "phi": np.zeros((2, 100)),
+        "avoidance": np.zeros((2, 100)),
         "violated": np.zeros((1, 99), bool),
         "reachable": np.ones(2, bool),
         "hypotheses": fewer,
     }.items():
-        with pytest.raises(ValueError, match="do not fit phi"):
+        with pytest.raises(ValueError, match="do not fit avoidance"):
             replace(inference, **{field: value})
 
 

@@ -110,10 +110,49 @@ def test_blocks_of_any_size_give_the_same_bits(
     phi = whole.violation_probabilities()
     assert np.sum((phi > 0.01) & (phi < 0.99)) > 10
     monkeypatch.setattr("mlci.maxent._CELLS_AT_ONCE", cells_at_once)
-    monkeypatch.setattr("mlci.maxent.PHI_BYTES", phi_bytes)
+    monkeypatch.setattr("mlci.maxent.ALPHA_BYTES", phi_bytes)
     in_blocks = replace(whole)
     np.testing.assert_array_equal(in_blocks.log_z, whole.log_z)
     np.testing.assert_array_equal(in_blocks.violation_probabilities(), phi)
+
+
+@pytest.mark.parametrize("depth", [1.0, 8.0, 60.0])
+def test_log_avoidance_is_the_difference_of_log_partitions(depth: float) -> None:
+    """To 1e-10 relative down to 1e-30 and below, to 1e-12 absolute elsewhere."""
+    deepest = 0.0
+    for seed in range(8):
+        mdp = toy_world(seed)
+        crossing = mdp.crosses.toarray()[:, 0].reshape(6, 4)
+        # Moves that cross region 0 are well paid for, so that hardly anything avoids it.
+        mdp = replace(mdp, reward=mdp.reward + depth * crossing)
+        free = TrajectoryDistribution(mdp, 0, [1, 3], 5)
+        if not free.is_possible:
+            continue
+        alpha = free.avoidance_probabilities()
+        for i in range(3):
+            under = replace(free, model=mdp.under(np.arange(3) == i))
+            if not under.is_possible:
+                assert alpha[i] == 0
+                continue
+            difference = free.log_z[0, 0] - under.log_z[0, 0]
+            tolerance = {"rtol": 1e-10, "atol": 0} if alpha[i] < 0.5 else {"rtol": 0, "atol": 1e-12}
+            np.testing.assert_allclose(-np.log(alpha[i]), difference, **tolerance)
+            deepest = max(deepest, difference)
+    assert deepest > depth
+
+
+def test_what_nothing_avoids_has_probability_zero_exactly() -> None:
+    """Two ways to a door that both go through."""
+    successor = np.array([[1, 2], [3, 3], [3, 3], [3, 3]])
+    crosses = np.zeros((8, 2), dtype=bool)
+    crosses[2:6, 0] = True  # the door, from both ways into the last cell
+    crosses[0, 1] = True  # the first way
+    rewards = np.random.default_rng(0).normal(size=(4, 2))
+    mdp = toy_model(successor, rewards, np.ones((4, 2), bool), crosses)
+    alpha = TrajectoryDistribution(mdp, 0, 3, 2).avoidance_probabilities()
+    one, other = rewards[0] + np.logaddexp(*rewards[1:3].T)
+    assert alpha[0] == 0
+    assert alpha[1] == pytest.approx(1 / (1 + np.exp(one - other)), rel=1e-12)
 
 
 def test_the_toy_worlds_are_not_trivial() -> None:
@@ -159,7 +198,7 @@ def test_an_unreachable_goal_is_refused_not_nan(goal: list[int]) -> None:
     assert not distribution.is_possible
     assert distribution.log_z[0, 0] == -np.inf
     assert not np.any(np.isnan(distribution.log_z))
-    with pytest.raises(ValueError, match="no trajectory from cell 0 reaches a goal: Phi"):
+    with pytest.raises(ValueError, match="no trajectory from cell 0 reaches a goal: prob"):
         distribution.violation_probabilities()
     with pytest.raises(ValueError, match="no trajectory from cell 0 reaches a goal: nothing"):
         distribution.sample(3, np.random.default_rng(0))

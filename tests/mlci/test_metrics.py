@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from mlci.evidence import rank_constraints
+from mlci.evidence import log_evidence, rank_constraints
 from mlci.metrics import (
     final_state_error,
     random_subsets,
@@ -57,7 +57,7 @@ def test_random_subsets_are_nested_and_distinct() -> None:
 
 
 def test_a_truth_that_covers_no_hypothesis_has_no_rank() -> None:
-    ranks = truth_ranks([[0.2, 0.1]], [[False, True]], np.array([False, False]), np.array([[0]]))
+    ranks = truth_ranks(np.array([[0.2, -np.inf]]), np.array([False, False]), np.array([[0]]))
     assert np.isnan(ranks).tolist() == [True]
 
 
@@ -67,8 +67,8 @@ def test_truth_ranks_equal_ranking_each_subset_alone() -> None:
     violated = rng.random((12, 7)) < 0.05
     truth = np.array([False, True, False, False, True, False, False])
     for subsets in random_subsets(12, 6, 9, rng):
-        ranks = truth_ranks(phi, violated, truth, subsets)
-        alone = [rank_constraints(phi[s], violated[s]).rank[truth].min() for s in subsets]
+        ranks = truth_ranks(log_evidence(1 - phi, violated), truth, subsets)
+        alone = [rank_constraints(1 - phi[s], violated[s]).rank[truth].min() for s in subsets]
         np.testing.assert_array_equal(ranks, alone)
 
 
@@ -81,14 +81,20 @@ def test_top_chances_by_hand() -> None:
         ([True, True, False], [1.0, 0.5, 1.0]),
         ([False, False, True], [0.0, 0.5, 0.0]),
     ):
-        found = [top_chances(phi, violated, np.array(good), each, 1) for each in both]
+        found = [
+            top_chances(log_evidence(1 - np.array(phi), violated), np.array(good), each, 1)
+            for each in both
+        ]
         np.testing.assert_allclose(np.concatenate(found), chances)
     for good, chances in (
         ([True, True, False], [1.0, 0.0, 0.0]),
         ([True, False, True], [0.0, 0.0, 0.0]),
         ([False, True, True], [0.0, 1.0, 1.0]),
     ):
-        found = [top_chances(phi, violated, np.array(good), each, 2) for each in both]
+        found = [
+            top_chances(log_evidence(1 - np.array(phi), violated), np.array(good), each, 2)
+            for each in both
+        ]
         np.testing.assert_allclose(np.concatenate(found), chances)
 
 
@@ -116,7 +122,7 @@ def test_top_chances_average_all_ways_to_break_ties(top: int) -> None:
                 merits = [merit(subset, i) for i in range(5)]
                 ranked = [sorted(order, key=merits.__getitem__, reverse=True) for order in orders]
                 expected.append(np.mean([good[best[:top]].all() for best in ranked]))
-            found = top_chances(phi, violated, good, subsets, top)
+            found = top_chances(log_evidence(1 - phi, violated), good, subsets, top)
             np.testing.assert_allclose(found, expected, atol=1e-12)
             seen += expected
     assert (top == 5) == (max(seen) == 0)

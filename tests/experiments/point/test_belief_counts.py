@@ -37,7 +37,7 @@ def counts(settings: Settings, store: Store, inference: Inference | None = None)
     hypotheses = model.regions.mask(settings.candidates.names)
     shape = 0, len(settings.candidates)
     if inference is None:
-        evidence = np.zeros(shape), np.zeros(shape, bool), np.zeros(0, bool)
+        evidence = np.ones(shape), np.zeros(shape, bool), np.zeros(0, bool)
         inference = Inference(settings.candidates, (), *evidence, settings.inference.prior)
     truth = model.regions.mask(settings.constraint.names)
     nothing = np.empty(0, dtype=int)
@@ -101,7 +101,7 @@ def test_beliefs_of_demonstrations_by_hand(tmp_path: Path) -> None:
     phi = np.array([[0.2, 0.5, 0.0, 0.0, 0.9], [0.0, 0.0, 0.0, 0.0, 0.0], [0.2, 0.8, 0.1, 0, 0]])
     violated = np.array([[0, 0, 1, 0, 0], [1, 0, 0, 0, 0], [0, 0, 0, 0, 1]], dtype=bool)
     reachable = np.array([True, False, True])
-    evidence = (np.concatenate([part, part[::-1]]) for part in (phi, violated, reachable))
+    evidence = (np.concatenate([part, part[::-1]]) for part in (1 - phi, violated, reachable))
     inference = Inference(settings.candidates, tuple("abcdef"), *evidence)
     table = counts(settings, Store(tmp_path), inference)
     assert table["source"].unique().tolist() == ["demonstrator"]

@@ -38,7 +38,7 @@ def walled(settings: Settings, low: float, high: float, keep: int = 8) -> Settin
 
 def inference(settings: Settings, phi: np.ndarray, violated: np.ndarray) -> Inference:
     names = tuple(map(str, range(len(phi))))
-    return Inference(settings.candidates, names, phi, violated, np.ones(len(phi), bool))
+    return Inference(settings.candidates, names, 1 - phi, violated, np.ones(len(phi), bool))
 
 
 def test_shares_are_of_rankings_whose_best_meet_the_truth(settings: Settings) -> None:
@@ -50,7 +50,7 @@ def test_shares_are_of_rankings_whose_best_meet_the_truth(settings: Settings) ->
     table = rank_table(settings, inference(settings, phi, violated), np.random.default_rng(1))
     subsets = random_subsets(9, 4, 12, np.random.default_rng(1))
     best = [
-        rank_constraints(phi[subset], violated[subset]).order[:2].tolist()
+        rank_constraints(1 - phi[subset], violated[subset]).order[:2].tolist()
         for each in subsets
         for subset in each
     ]
