@@ -24,7 +24,8 @@ from mlci.demonstrations import Task
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.diagnosis import MOST_UNREACHABLE, Diagnosis, diagnose
 from mlci.grids import Grid
-from mlci.maxent import TrajectoryDistribution, reachable_cells
+from mlci.maxent import TrajectoryDistribution
+from mlci.recursions import reachable_cells
 from mlci.spaces import Bools, Floats
 from mlci.tabular import action_grid, discretize
 
@@ -221,7 +222,7 @@ def _try(
     distributions = [TrajectoryDistribution.of_task(model, task) for task in tasks]
     reached = np.array(
         [
-            np.isin(each.goal, reachable_cells(model, each.start, each.steps)[-1]).any()
+            np.isin(each.goal, reachable_cells(model, np.array([each.start]), each.steps)[-1]).any()
             for each in distributions
         ]
     )

@@ -98,7 +98,7 @@ class Grid:
         number = np.ravel_multi_index(tuple(np.moveaxis(position, -1, 0)), self.shape)
         return np.where(self.space.contains(wrapped), number, -1)
 
-    def points_inside(self, samples: int, cells: slice = slice(None)) -> Floats:
+    def points_inside(self, samples: int, cells: slice | Ints = slice(None)) -> Floats:
         """(S, samples^n, n): the centres of a regular subdivision of every cell, or of some."""
         ticks = (np.arange(samples) + 0.5) / samples - 0.5
         offsets = np.stack(np.meshgrid(*[ticks] * len(self.shape), indexing="ij"), axis=-1)

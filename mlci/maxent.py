@@ -8,22 +8,41 @@ be reached from the start in t moves, and so wherever no probability ever is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy import sparse
 
 from mlci.demonstrations import Task
+from mlci.end_moves import EndMoves, first_moves, last_moves, only_moves
+from mlci.recursions import (
+    add_moves,
+    avoidance_backwards,
+    avoidance_of_moves,
+    move_probabilities,
+    reachable_cells,
+    soft_bellman_backup,
+)
 from mlci.simulate import step_count
-from mlci.spaces import Floats, Ints
+from mlci.spaces import Box, Floats, Ints
 from mlci.tabular import TabularModel
 
-_CELLS_AT_ONCE = 1 << 12  # whose moves a step of work holds
 _UNEVEN = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
 ALPHA_BYTES = 1 << 29  # of probabilities held at once, else regions go block by block
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Where a trajectory begins and ends, as states; see `mlci.end_moves`.
+
+    Attributes:
+        start: (n,) first state.
+        goal: region of the last state.
+    """
+
+    start: Floats
+    goal: Box
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +54,7 @@ class TrajectoryDistribution:
         start: start cell.
         goal: (G,) goal cells: a trajectory ends in any of them. None makes the goal unreachable.
         steps: T.
+        ends: the states at which it begins and ends; None takes cells for both, as the paper does.
 
     Raises:
         ValueError: a start or a goal that is no cell, such as the -1 of a state outside the grid,
@@ -45,6 +65,7 @@ class TrajectoryDistribution:
     start: int
     goal: Ints
     steps: int
+    ends: Ends | None = None
 
     def __post_init__(self) -> None:
         goal, last = np.atleast_1d(np.asarray(self.goal)), self.model.states - 1
@@ -59,15 +80,21 @@ class TrajectoryDistribution:
 
     @classmethod
     def of_task(
-        cls, model: TabularModel, task: Task, *, round_horizon: bool = False
+        cls,
+        model: TabularModel,
+        task: Task,
+        *,
+        round_horizon: bool = False,
+        exact_ends: bool = False,
     ) -> TrajectoryDistribution:
-        """The distribution of a task: from the cell of its start into the cells of its goal.
+        """The distribution of a task: from its start into its goal.
 
         Args:
             model: the tabular model.
             task: the task.
             round_horizon: take the nearest number of time steps where dt does not divide the
                 horizon.
+            exact_ends: begin and end at states, not at cells.
 
         Raises:
             ValueError: a start outside the state space, or a horizon that dt does not divide (to a
@@ -79,13 +106,45 @@ class TrajectoryDistribution:
         steps = max(1, round(task.horizon / model.dt))
         if not round_horizon:
             steps = step_count(task.horizon, model.dt, _UNEVEN)
-        return cls(model, start, model.grid.cells_in(task.goal), steps)
+        ends = Ends(task.start, task.goal) if exact_ends else None
+        return cls(model, start, model.grid.cells_in(task.goal), steps, ends)
 
     @cached_property
     def log_z(self) -> Floats:
         """(T+1, S) log Z to go [nat], by the soft Bellman backup; log_z[0, start] is log Z."""
-        cells = reachable_cells(self.model, self.start, self.steps)
-        return _soft_bellman_backup(self.model, cells, self.goal)
+        log_z = np.full((self.steps + 1, self.model.states), -np.inf)
+        if self.ends is None:
+            cells = reachable_cells(self.model, np.array([self.start]), self.steps)
+            log_z[self.steps, np.intersect1d(cells[-1], self.goal)] = 0.0
+            soft_bellman_backup(self.model, log_z, dict(enumerate(cells[:-1])))
+            return log_z
+        log_z[self.steps, self.goal] = 0.0
+        if self.steps > 1:
+            add_moves(log_z, self.steps - 1, self._last_moves)
+            soft_bellman_backup(
+                self.model, log_z, dict(enumerate(self._cells_between[:-1], start=1))
+            )
+        add_moves(log_z, 0, self._first_moves)
+        return log_z
+
+    @cached_property
+    def _first_moves(self) -> EndMoves:
+        """The moves from the exact start."""
+        assert self.ends is not None
+        if self.steps == 1:
+            return only_moves(self.model, self.ends.start, self.goal, self.ends.goal)
+        return first_moves(self.model, self.ends.start)
+
+    @cached_property
+    def _cells_between(self) -> list[Ints]:
+        """Cells that can be occupied after 1 .. T-1 moves from the exact start."""
+        return reachable_cells(self.model, np.unique(self._first_moves.successor), self.steps - 2)
+
+    @cached_property
+    def _last_moves(self) -> EndMoves:
+        """The moves that end at the exact goal."""
+        assert self.ends is not None
+        return last_moves(self.model, self._cells_between[-1], self.goal, self.ends.goal)
 
     @property
     def is_possible(self) -> bool:
@@ -100,7 +159,7 @@ class TrajectoryDistribution:
             moves, whose rows sum to 1.
         """
         cells = np.flatnonzero(self.log_z[t] > -np.inf)
-        return cells, _move_probabilities(self.model, self.log_z, t, cells)
+        return cells, move_probabilities(self.model, self.log_z, t, cells)
 
     def avoidance_probabilities(self) -> Floats:
         """alpha_i (C,): the probability that a trajectory does not cross region i.
@@ -117,10 +176,21 @@ class TrajectoryDistribution:
         support = int(np.max(np.sum(self.log_z > -np.inf, axis=1)))
         blocks = min(regions, -(-regions * 2 * 8 * support // ALPHA_BYTES))
         edges = np.linspace(0, regions, max(1, blocks) + 1).astype(int)
-        alpha = np.empty(regions)
-        for first, last in pairwise(edges):
-            alpha[first:last] = _alpha_of_regions(self.model, self.log_z, first, last)
+        alpha = np.concatenate([self._avoidance(*block) for block in pairwise(edges)])
         return np.minimum(alpha, 1.0)
+
+    def _avoidance(self, first: int, last: int) -> Floats:
+        """alpha of the regions from `first` to before `last`."""
+        ones = np.ones((int(np.sum(self.log_z[self.steps] > -np.inf)), last - first))
+        if self.ends is None:
+            alpha = avoidance_backwards(self.model, self.log_z, ones, self.steps, 0, first)
+        elif self.steps == 1:
+            alpha = avoidance_of_moves(self.log_z, 0, self._first_moves, ones, first)
+        else:
+            alpha = avoidance_of_moves(self.log_z, self.steps - 1, self._last_moves, ones, first)
+            alpha = avoidance_backwards(self.model, self.log_z, alpha, self.steps - 1, 1, first)
+            alpha = avoidance_of_moves(self.log_z, 0, self._first_moves, alpha, first)
+        return alpha[0]
 
     def violation_probabilities(self) -> Floats:
         """Phi_(i,T) = 1 - alpha_i (C,): the probability that a trajectory crosses region i."""
@@ -133,14 +203,17 @@ class TrajectoryDistribution:
             (count, T+1) cells and (count, T) moves.
 
         Raises:
-            ValueError: no trajectory reaches a goal.
+            ValueError: no trajectory reaches a goal, or ends that are states: then the first and
+                the last move are none of the table's.
         """
         self._require_possible("nothing to sample")
+        if self.ends is not None:
+            raise ValueError("trajectories are sampled between cells: take exact_ends=False")
         cells = [np.full(count, self.start, dtype=np.int64)]
         moves = []
         for t in range(self.steps):
             here, place = np.unique(cells[-1], return_inverse=True)
-            probabilities = _move_probabilities(self.model, self.log_z, t, here)
+            probabilities = move_probabilities(self.model, self.log_z, t, here)
             cumulative = np.cumsum(probabilities[place], axis=1)
             # Scaled by the last entry, so that rounding cannot lift a draw past every move.
             draws = rng.random(count)[:, None] * cumulative[:, -1:]
@@ -152,131 +225,3 @@ class TrajectoryDistribution:
         """Raise where there is no distribution."""
         if not self.is_possible:
             raise ValueError(f"no trajectory from cell {self.start} reaches a goal: {consequence}")
-
-
-def reachable_cells(model: TabularModel, start: int, steps: int) -> list[Ints]:
-    """Cells that can be occupied after t = 0 .. steps allowed moves from a start cell."""
-    merged, cells = model.merged, [np.array([start], dtype=np.int64)]
-    for _ in range(steps):
-        move, _ = _ranges(merged.begins, cells[-1])
-        mark = np.zeros(model.states, dtype=bool)
-        mark[merged.successor[move[merged.log_weight[move] > -np.inf]]] = True
-        cells.append(np.flatnonzero(mark))
-    return cells
-
-
-def _soft_bellman_backup(model: TabularModel, cells: list[Ints], goal: Ints) -> Floats:
-    """log_z (T+1, S), backwards from the goal over the cells that can be occupied at each step."""
-    merged, steps = model.merged, len(cells) - 1
-    log_z = np.full((steps + 1, model.states), -np.inf)
-    log_z[steps, np.intersect1d(cells[steps], goal)] = 0.0
-    for t in reversed(range(steps)):
-        for here in _parts(model, cells[t]):
-            move, ends = _ranges(merged.begins, here)
-            value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
-            best = np.maximum.reduceat(value, ends[:-1])
-            finite = best > -np.inf
-            shift = np.repeat(np.where(finite, best, 0.0), np.diff(ends))
-            total = np.add.reduceat(np.exp(value - shift), ends[:-1])
-            log_z[t, here[finite]] = best[finite] + np.log(total[finite])
-    return log_z
-
-
-def _alpha_of_regions(model: TabularModel, log_z: Floats, first: int, last: int) -> Floats:
-    """alpha of the regions from `first` to before `last`, of the one cell that log_z starts in."""
-    steps = len(log_z) - 1
-    row_of = np.zeros(model.states, dtype=np.int64)
-    cells_after = np.flatnonzero(log_z[steps] > -np.inf)
-    alpha = np.ones((len(cells_after), last - first))
-    for t in reversed(range(steps)):
-        row_of[:] = -1
-        row_of[cells_after] = np.arange(len(cells_after))
-        cells = np.flatnonzero(log_z[t] > -np.inf)
-        alpha_after, alpha = alpha, np.empty((len(cells), last - first))
-        row = 0
-        for here in _parts(model, cells):
-            now = alpha[row : row + len(here)]
-            now[:] = _alpha_one_step_back(model, log_z, t, here, row_of, alpha_after, first)
-            row += len(here)
-        cells_after = cells
-    return alpha[0]
-
-
-def _alpha_one_step_back(
-    model: TabularModel,
-    log_z: Floats,
-    t: int,
-    cells: Ints,
-    row_of: Ints,
-    alpha_after: Floats,
-    first: int,
-) -> Floats:
-    """alpha_t (Q, C') of some cells, from alpha_(t+1) (Q', C'), whose rows `row_of` (S,) gives.
-
-    First the sum over all moves, as a product; then, for the cells and regions that some move
-    crosses, the sum over the others anew.
-    """
-    merged, last = model.merged, first + alpha_after.shape[1]
-    move, ends = _ranges(merged.begins, cells)
-    value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
-    probability = np.exp(value - np.repeat(log_z[t, cells], np.diff(ends)))
-    probability /= np.repeat(np.add.reduceat(probability, ends[:-1]), np.diff(ends))
-    # A successor outside the support has probability 0: whichever row stands for it.
-    column = np.maximum(row_of[merged.successor[move]], 0)
-    shape = len(cells), len(alpha_after)
-    alpha = sparse.csr_matrix((probability, column, ends), shape=shape) @ alpha_after
-    owner, entry, region = _of_cells(
-        merged.crossing_begins, merged.crossing_region, cells, first, last
-    )
-    if len(owner):
-        pair, which = np.unique(owner * (last - first) + region, return_inverse=True)
-        cell_of, region_of = np.divmod(pair, last - first)
-        # All moves of the cell of each pair, one pair after the other, without those that cross.
-        every, begins = _ranges(ends, cell_of)
-        weight = probability[every]
-        place = merged.crossing_move[entry] - merged.begins[cells[owner]]
-        weight[begins[which] + place] = 0.0
-        weight *= alpha_after[column[every], np.repeat(region_of, np.diff(begins))]
-        alpha[cell_of, region_of] = np.add.reduceat(weight, begins[:-1])
-    owner, _, region = _of_cells(merged.certain_begins, merged.certain_region, cells, first, last)
-    alpha[owner, region] = 0.0
-    return alpha
-
-
-def _of_cells(
-    begins: Ints, regions: Ints, cells: Ints, first: int, last: int
-) -> tuple[Ints, Ints, Ints]:
-    """Entries of some cells whose regions are from `first` to before `last`.
-
-    Returns the place in `cells` that each belongs to, its own number, and its region less `first`.
-    """
-    entry, ends = _ranges(begins, cells)
-    owner = np.repeat(np.arange(len(cells)), np.diff(ends))
-    region = regions[entry] - first
-    inside = (region >= 0) & (region < last - first)
-    if inside.all():
-        return owner, entry, region
-    return owner[inside], entry[inside], region[inside]
-
-
-def _parts(model: TabularModel, cells: Ints) -> Iterator[Ints]:
-    """Cells that some move leaves, in parts whose moves fit into memory and cache."""
-    begins = model.merged.begins
-    left = cells[begins[cells + 1] > begins[cells]]
-    for first in range(0, len(left), _CELLS_AT_ONCE):
-        yield left[first : first + _CELLS_AT_ONCE]
-
-
-def _ranges(begins: Ints, cells: Ints) -> tuple[Ints, Ints]:
-    """The numbers from begins[s] to before begins[s+1] of some cells s, and where each begin."""
-    counts = begins[cells + 1] - begins[cells]
-    ends = np.append(0, np.cumsum(counts))
-    return np.arange(ends[-1]) + np.repeat(begins[cells] - ends[:-1], counts), ends
-
-
-def _move_probabilities(model: TabularModel, log_z: Floats, t: int, cells: Ints) -> Floats:
-    """(Q, M) probabilities of the moves of cells that carry probability at step t."""
-    value = model.reward[cells] + log_z[t + 1, model.successor[cells]]
-    value = np.where(model.allowed[cells], value, -np.inf)
-    probabilities = np.exp(value - log_z[t, cells, None])
-    return np.asarray(probabilities / np.sum(probabilities, axis=1, keepdims=True))

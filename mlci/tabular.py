@@ -19,7 +19,7 @@ move = action * k^n + start point. In the centre model a move is an action.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -56,6 +56,8 @@ class TabularModel:
         reward: (S, M) reward of a move, r dt / temperature [nat].
         allowed: (S, M) whether a move may be taken.
         crosses: (S * M, C) sparse boolean: row s * M + move, the regions its path enters.
+        temperature: what the rewards are divided by, (2).
+        truth: (C,) mask of the regions that no move may cross, see `under`; none by default.
 
     Raises:
         ValueError: arrays whose shapes disagree, an allowed move without a successor, or a dt that
@@ -71,9 +73,13 @@ class TabularModel:
     reward: Floats
     allowed: Bools
     crosses: sparse.csr_matrix
+    temperature: float = 1.0
+    truth: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
         shape = self.successor.shape
+        if not len(self.truth):
+            object.__setattr__(self, "truth", np.zeros(len(self.regions), dtype=bool))
         if not (
             len(shape) == 2
             and shape[0] == self.grid.size
@@ -108,6 +114,21 @@ class TabularModel:
         return np.repeat(np.arange(len(self.actions)), self.moves // len(self.actions))
 
     @cached_property
+    def substeps(self) -> int:
+        """Integrator steps of a move."""
+        return substep_count(self.system, self.grid, self.actions, self.dt)
+
+    def move_origins(self, cells: Ints, moves: Ints) -> Floats:
+        """(L, n) the states in which some moves of some cells begin."""
+        points = self.moves // len(self.actions)  # k^n start points of a cell
+        samples = round(points ** (1 / len(self.grid.shape)))
+        return self.grid.points_inside(samples, cells)[np.arange(len(cells)), moves % points]
+
+    def move_reward(self, states: Floats, controls: Floats) -> Floats:
+        """(L,) reward r dt / temperature [nat] of controls (L, m) held from states (L, n)."""
+        return self.system.running_reward(states, controls) * (self.dt / self.temperature)
+
+    @cached_property
     def merged(self) -> MergedMoves:
         """The moves of each cell, those with the same successor and crossings merged."""
         return merge_moves(self.successor, self.reward, self.allowed, self.crosses, self.blocks())
@@ -124,9 +145,10 @@ class TabularModel:
         Args:
             truth: (C,) mask over the regions, such as `model.regions.mask(["c1"])`.
         """
-        columns = np.flatnonzero(as_mask(truth, len(self.regions)))
+        mask = as_mask(truth, len(self.regions))
+        columns = np.flatnonzero(mask)
         crossed = np.asarray(self.crosses[:, columns].sum(axis=1)).reshape(self.allowed.shape) > 0
-        constrained = replace(self, allowed=self.allowed & ~crossed)
+        constrained = replace(self, allowed=self.allowed & ~crossed, truth=self.truth | mask)
         if "merged" in vars(self):  # what takes the time has been done
             vars(constrained)["merged"] = self.merged.without(crossed)
         return constrained
@@ -196,7 +218,7 @@ def discretize(
         origin = np.tile(inside, (1, len(actions), 1)).reshape(-1, inside.shape[-1])
         control = np.tile(control_of, (len(inside), 1))
         path = rollout(system, origin, control[:, None, :], dt, substeps)
-        end, crossed = _follow(grid, regions, path)
+        end, crossed = follow(grid, regions, path)
         crosses.append(crossed)
         successor[block] = end.reshape(-1, shape[1])
         rewards = system.running_reward(origin, control) * (dt / temperature)
@@ -213,6 +235,7 @@ def discretize(
         reward=reward,
         allowed=successor >= 0,
         crosses=sparse.vstack(crosses, format="csr"),
+        temperature=temperature,
     )
 
 
@@ -239,7 +262,7 @@ def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int
     return int(np.ceil(dt / shortest - 1e-9))
 
 
-def _follow(grid: Grid, regions: Regions, path: Floats) -> tuple[Ints, sparse.csr_matrix]:
+def follow(grid: Grid, regions: Regions, path: Floats) -> tuple[Ints, sparse.csr_matrix]:
     """Successor (-1 where the path leaves the space) and crossings of paths (Q, K+1, n)."""
     stays = np.all(grid.space.contains(path), axis=-1)
     successor = np.full(len(path), -1, dtype=np.int64)

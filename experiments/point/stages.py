@@ -242,6 +242,7 @@ def tabular_model(settings: Settings, store: Store) -> TabularModel:
         dt=settings.dt,
         regions=hypotheses.joined(truth),
         crosses=sparse.hstack(crosses, format="csr"),
+        temperature=settings.temperature,
         **{name: stored[name] for name in _MOVES},
     )
 

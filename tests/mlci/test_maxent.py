@@ -11,7 +11,8 @@ from toy_models import toy_model
 
 from mlci.demonstrations import Task
 from mlci.grids import Grid
-from mlci.maxent import TrajectoryDistribution, reachable_cells
+from mlci.maxent import TrajectoryDistribution
+from mlci.recursions import reachable_cells
 from mlci.regions import Regions
 from mlci.spaces import Box, Floats
 from mlci.systems import DoubleIntegrator, Pendulum
@@ -109,7 +110,7 @@ def test_blocks_of_any_size_give_the_same_bits(
     whole = TrajectoryDistribution(mdp, 40, [90, 91], 10)
     phi = whole.violation_probabilities()
     assert np.sum((phi > 0.01) & (phi < 0.99)) > 10
-    monkeypatch.setattr("mlci.maxent._CELLS_AT_ONCE", cells_at_once)
+    monkeypatch.setattr("mlci.recursions._CELLS_AT_ONCE", cells_at_once)
     monkeypatch.setattr("mlci.maxent.ALPHA_BYTES", phi_bytes)
     in_blocks = replace(whole)
     np.testing.assert_array_equal(in_blocks.log_z, whole.log_z)
@@ -186,7 +187,12 @@ def test_only_cells_between_start_and_goal_carry_probability() -> None:
         np.ones((cells, 1), dtype=bool),
         np.zeros((cells, 1), dtype=bool),
     )
-    assert [part.tolist() for part in reachable_cells(corridor, 1, 3)] == [[1], [2], [3], [4]]
+    assert [part.tolist() for part in reachable_cells(corridor, np.array([1]), 3)] == [
+        [1],
+        [2],
+        [3],
+        [4],
+    ]
     log_z = TrajectoryDistribution(corridor, 1, 4, 3).log_z
     assert np.argwhere(np.isfinite(log_z)).tolist() == [[0, 1], [1, 2], [2, 3], [3, 4]]
     assert not TrajectoryDistribution(corridor, 1, 5, 3).is_possible

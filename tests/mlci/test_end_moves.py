@@ -1,0 +1,108 @@
+"""Trajectories that begin and end at states, against a list of all of them."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from mlci.demonstrations import Task
+from mlci.grids import Grid
+from mlci.maxent import TrajectoryDistribution
+from mlci.regions import Regions
+from mlci.spaces import Box, Floats, StateSpace
+from mlci.systems import FunctionSystem
+from mlci.tabular import TabularModel, discretize
+
+# A floor of 4 x 3 tiles on which one steps to a neighbour, or stays, in 1 s; a wind blows along x
+# that makes the way there and back differ. Regions are smaller than tiles.
+SPACE = StateSpace(Box([0.0, 0.0], [4.0, 3.0]), [False, False], ("x", "y"))
+FLOOR = FunctionSystem(
+    lambda x, u: (u[..., 0] + 0.2 * np.sin(2 * x[..., 1]), u[..., 1]), SPACE, Box([-1, -1], [1, 1])
+)
+STEPS = np.array(list(itertools.product([-1.0, 0.0, 1.0], repeat=2)))
+REGIONS = Regions.from_grid(SPACE, (8, 6))
+GRID = Grid(SPACE, (4, 3))
+TASKS = [
+    Task([0.9, 1.2], Box.point([3.1, 1.9]), 3.0),
+    Task([0.2, 0.1], Box([1.6, -np.inf], [1.9, np.inf]), 2.0),
+    Task([1.8, 1.5], Box.point([2.3, 2.2]), 1.0),
+]
+
+
+@pytest.fixture(scope="module")
+def model() -> TabularModel:
+    return discretize(FLOOR, GRID, STEPS, 1.0, REGIONS, temperature=2.0)
+
+
+def flow(state: Floats, step: Floats) -> Floats:
+    """The motion of one step in 200 small ones."""
+    path = [np.asarray(state, float)]
+    for _ in range(200):
+        middle = path[-1] + FLOOR.dynamics(path[-1], step) / 400
+        path.append(path[-1] + FLOOR.dynamics(middle, step) / 200)
+    return np.array(path)
+
+
+def listed(task: Task, truth: np.ndarray) -> tuple[float, Floats]:
+    """Z, and for each region the part of Z that avoids it, over all sequences of steps."""
+    count, cells = round(task.horizon), GRID.cells_in(task.goal)
+    total, avoiding = 0.0, np.zeros(len(REGIONS))
+    for sequence in itertools.product(STEPS, repeat=count):
+        state, crossed = task.start, np.zeros(len(REGIONS), dtype=bool)
+        for k, step in enumerate(sequence):
+            path = flow(state, step)
+            cell = int(GRID.index(path[-1]))
+            if k == count - 1 and cell in cells:
+                bend = SPACE.excess(path[-1], task.goal)
+                path = path - np.linspace(0, 1, len(path))[:, None] * bend
+            if not np.all(SPACE.contains(path)) or truth[REGIONS.violated_by(path)].any():
+                break
+            crossed |= REGIONS.violated_by(path)
+            state = GRID.centers[cell]
+        else:
+            if cell in cells:
+                weight = np.exp(-np.sum(np.square(sequence)) / 2.0)
+                total += weight
+                avoiding += weight * ~crossed
+    return total, avoiding
+
+
+@pytest.mark.parametrize("task", TASKS, ids=["three steps", "two steps", "one step"])
+@pytest.mark.parametrize("forbidden", [[], ["15"]], ids=["free", "under a truth"])
+def test_exact_ends_are_those_of_all_trajectories(
+    model: TabularModel, task: Task, forbidden: list[str]
+) -> None:
+    """The moves' chords stray under 1 % of a tile from the motion: no region begins that near."""
+    truth = REGIONS.mask(forbidden)
+    total, avoiding = listed(task, truth)
+    distribution = TrajectoryDistribution.of_task(model.under(truth), task, exact_ends=True)
+    assert distribution.log_z[0, distribution.start] == pytest.approx(np.log(total), abs=1e-12)
+    alpha = distribution.avoidance_probabilities()
+    np.testing.assert_allclose(alpha, avoiding / total, rtol=0, atol=1e-12)
+    assert np.all(alpha[truth] == 1)
+    between = TrajectoryDistribution.of_task(model.under(truth), task).avoidance_probabilities()
+    assert np.max(np.abs(alpha - between)) > 0.1
+
+
+def test_a_region_round_the_centre_of_the_start_cell_can_be_avoided() -> None:
+    """As the demonstration does, which begins beside it."""
+    pillar = Regions.from_boxes(SPACE, [Box([0.4, 1.4], [0.6, 1.6])])
+    model = discretize(FLOOR, GRID, STEPS, 1.0, pillar)
+    task = Task([0.9, 1.1], Box.point([3.5, 1.5]), 3.0)
+    cells, exact = (
+        TrajectoryDistribution.of_task(model, task, exact_ends=ends) for ends in (False, True)
+    )
+    assert cells.avoidance_probabilities()[0] == 0
+    assert exact.avoidance_probabilities()[0] > 0.9
+
+
+def test_ends_that_cannot_be_joined_are_impossible_not_nan(model: TabularModel) -> None:
+    far = Task([0.5, 0.5], Box.point([3.9, 2.9]), 2.0)
+    distribution = TrajectoryDistribution.of_task(model, far, exact_ends=True)
+    assert not distribution.is_possible
+    assert not np.any(np.isnan(distribution.log_z))
+    near = TrajectoryDistribution.of_task(model, TASKS[0], exact_ends=True)
+    with pytest.raises(ValueError, match="sampled between cells: take exact_ends=False"):
+        near.sample(1, np.random.default_rng(0))
