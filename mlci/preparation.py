@@ -103,6 +103,7 @@ def infer(
     prior_none: float = 0.5,
     rates: Rates = PAPER,
     round_horizon: bool = False,
+    exact_ends: bool = False,
     n_jobs: int = 1,
     progress: Progress | None = None,
 ) -> Inference:
@@ -115,6 +116,8 @@ def infer(
         prior_none: prior probability that there is no constraint.
         rates: model error and rule breaking of the demonstrators.
         round_horizon: take the nearest number of time steps where dt does not divide a duration.
+        exact_ends: let trajectories begin and end at states, not at cells as the paper does, so
+            that a region is not certain to be entered only because it holds a cell's centre.
         n_jobs: tasks that are worked on at once; -1 is one a core. The result is the same.
         progress: called with how many tasks are done, and of how many.
 
@@ -127,6 +130,7 @@ def infer(
         [demonstration.task for demonstration in demonstrations],
         hypotheses=hypotheses,
         round_horizon=round_horizon,
+        exact_ends=exact_ends,
         n_jobs=n_jobs,
         progress=progress,
     )
@@ -143,6 +147,7 @@ def prepare(
     *,
     hypotheses: ArrayLike | None = None,
     round_horizon: bool = False,
+    exact_ends: bool = False,
     n_jobs: int = 1,
     progress: Progress | None = None,
 ) -> PreparedInference:
@@ -154,7 +159,10 @@ def prepare(
     count = len(model.regions)
     mask = np.ones(count, dtype=bool) if hypotheses is None else as_mask(hypotheses, count)
     distributions = [
-        TrajectoryDistribution.of_task(model, task, round_horizon=round_horizon) for task in tasks
+        TrajectoryDistribution.of_task(
+            model, task, round_horizon=round_horizon, exact_ends=exact_ends
+        )
+        for task in tasks
     ]
     avoidance, reachable = np.ones((len(tasks), count)), np.zeros(len(tasks), dtype=bool)
     if tasks:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mlci.demonstrations import Demonstration, Task
-from mlci.evidence import Ranking, rank_constraints
+from mlci.evidence import Ranking, Rates, log_evidence, rank_constraints
 from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
@@ -193,3 +193,16 @@ def test_no_demonstration_leaves_the_prior(model: TabularModel) -> None:
     inference = infer(model, [], prior_none=0.3)
     assert inference.posterior_none == pytest.approx(0.3)
     np.testing.assert_allclose(inference.posterior, 0.7 / 100)
+
+
+def test_exact_ends_and_rates_reach_the_evidence(model: TabularModel) -> None:
+    demonstrations = [demonstration(task, 0) for task in (0, 2)]
+    exact = infer(model, demonstrations, exact_ends=True, rates=Rates(0.1, 0.05))
+    for row, each in zip(exact.avoidance, demonstrations, strict=True):
+        distribution = TrajectoryDistribution.of_task(model, each.task, exact_ends=True)
+        np.testing.assert_array_equal(row, distribution.avoidance_probabilities())
+    evidence = log_evidence(exact.avoidance, exact.violated, Rates(0.1, 0.05))
+    np.testing.assert_array_equal(exact.evidence, evidence)
+    np.testing.assert_allclose(exact.gain, evidence.sum(axis=0), rtol=1e-12)
+    assert not np.array_equal(exact.avoidance, infer(model, demonstrations).avoidance)
+    assert exact.of([1]).rates == Rates(0.1, 0.05)
