@@ -53,6 +53,7 @@ CHANGES = {
     "demonstrations.goal_weight": ("demonstrations.goal_weight=200.0", DEMONSTRATOR),
     "demonstrations.hold": ("demonstrations.hold=0.4", DEMONSTRATOR),
     "demonstrations.clip": ("demonstrations.clip=true", DEMONSTRATOR),
+    "demonstrations.integrator": ("demonstrations.integrator=rk4", DEMONSTRATOR),
     "demonstrations.wind": ("demonstrations.wind=false", DEMONSTRATOR),
     "safety.method": ("safety.method=escapes", {"safe_set", "demonstrations"}),
     "safety.shape": ("safety.shape=[23,21]", {"safe_set", "demonstrations"}),
