@@ -89,6 +89,8 @@ class Combinations:
         typed = parser.parse_overrides(list(arguments))
         typed_keys = {override.key_or_group for override in typed}
         values: dict[str, list[str]] = {}
+        if not isinstance(self.params or {}, Mapping):
+            raise ConfigError(f"hydra.sweeper.params: {self.params} is no mapping of keys")
         swept = [quote_options(f"{key}={value}") for key, value in (self.params or {}).items()]
         for override in parser.parse_overrides(swept):
             _values(override)  # what cannot be swept is refused even where the command line wins
