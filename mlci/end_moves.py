@@ -36,36 +36,39 @@ class EndMoves:
 
 def first_moves(model: TabularModel, start: Floats) -> EndMoves:
     """Every action from a state (n,), as far as it stays in the space and out of the truth."""
-    origin = np.broadcast_to(start, (len(model.actions), len(start)))
-    path = rollout(model.system, origin, model.actions[:, None, :], model.dt, model.substeps)
-    reward = model.move_reward(origin, model.actions)
-    cell = np.full(len(origin), model.grid.index(start))
-    return _allowed(model, cell, path, reward)
+    return _allowed(model, *_from_state(model, start))
 
 
 def last_moves(model: TabularModel, cells: Ints, goal_cells: Ints, goal: Box) -> EndMoves:
     """The moves from some cells into the goal's cells, bent to end in the goal region."""
-    into = model.allowed[cells] & np.isin(model.successor[cells], goal_cells)
-    row, move = np.nonzero(into)
+    # Whether the truth allows a move is seen on the bent path.
+    row, move = np.nonzero(np.isin(model.successor[cells], goal_cells))
     cell = cells[row]
     origin, action = model.move_origins(cell, move), model.actions[model.action[move]]
     path = rollout(model.system, origin, action[:, None, :], model.dt, model.substeps)
-    beyond = model.grid.space.excess(path[:, -1], goal)
-    share = np.linspace(0, 1, path.shape[1])[:, None]
-    return _allowed(model, cell, path - share * beyond[:, None, :], model.reward[cell, move])
+    return _allowed(model, cell, _bent(model, path, goal), model.reward[cell, move])
 
 
 def only_moves(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> EndMoves:
     """The moves of a trajectory of one step: from a state into the goal region."""
+    cell, path, reward = _from_state(model, start)
+    into = np.isin(model.grid.index(path[:, -1]), goal_cells)
+    return _allowed(model, cell[into], _bent(model, path[into], goal), reward[into])
+
+
+def _from_state(model: TabularModel, start: Floats) -> tuple[Ints, Floats, Floats]:
+    """The cell (A,), path (A, K+1, n) and reward (A,) of every action from a state (n,)."""
     origin = np.broadcast_to(start, (len(model.actions), len(start)))
     path = rollout(model.system, origin, model.actions[:, None, :], model.dt, model.substeps)
-    into = np.isin(model.grid.index(path[:, -1]), goal_cells)
-    path, origin, actions = path[into], origin[into], model.actions[into]
+    cell = np.full(len(origin), model.grid.index(start))
+    return cell, path, model.move_reward(origin, model.actions)
+
+
+def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
+    """Paths (L, K+1, n), moved in proportion to time so that they end in the goal region."""
     beyond = model.grid.space.excess(path[:, -1], goal)
     share = np.linspace(0, 1, path.shape[1])[:, None]
-    cell = np.full(len(path), model.grid.index(start))
-    reward = model.move_reward(origin, actions)
-    return _allowed(model, cell, path - share * beyond[:, None, :], reward)
+    return path - share * beyond[:, None, :]
 
 
 def _allowed(model: TabularModel, cell: Ints, path: Floats, reward: Floats) -> EndMoves:

@@ -77,6 +77,24 @@ def test_exact_ends_are_those_of_all_trajectories(
     assert np.max(np.abs(alpha - between)) > 0.1
 
 
+@pytest.mark.parametrize("task", TASKS[1:], ids=["two steps", "one step"])
+def test_a_truth_forbids_what_enters_it_as_it_is_bent(model: TabularModel, task: Task) -> None:
+    """Every region in turn: also those that a last move enters only before it is bent."""
+    bent_aside = 0
+    for i in range(len(REGIONS)):
+        truth = np.arange(len(REGIONS)) == i
+        total, _ = listed(model, task, truth)
+        under = model.under(truth)
+        distribution = TrajectoryDistribution.of_task(under, task, exact_ends=True)
+        assert distribution.is_possible == (total > 0)
+        if total:
+            log_z = distribution.log_z[0, distribution.start]
+            assert log_z == pytest.approx(np.log(total), abs=1e-12)
+        into = np.isin(model.successor, distribution.goal)
+        bent_aside += np.sum(into & ~under.allowed)
+    assert bent_aside > 10
+
+
 def test_a_region_round_the_centre_of_the_start_cell_can_be_avoided() -> None:
     """As the demonstration does, which begins beside it."""
     pillar = Regions.from_boxes(SPACE, [Box([0.4, 1.4], [0.6, 1.6])])
