@@ -30,12 +30,12 @@ from experiments.tracking.trees import canonical_json, plain
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
 from mlci.inference import Inference
+from mlci.maxent import ROUNDED_TIMES
 from mlci.recordings.read import Problem, read_demonstrations
+from mlci.simulate import step_count
 from mlci.tabular import TabularModel, action_grid, discretize
 from paper_figures import hypothesis_map
 from paper_figures.style import save
-
-_UNEVEN = 1e-3  # of a time step: how far a duration may be off, for times that were rounded
 
 
 def main() -> int:
@@ -89,9 +89,10 @@ def _usable(settings: RecordedSettings) -> tuple[list[Demonstration], list[Probl
     usable = []
     for demonstration in read:
         duration = demonstration.task.horizon
-        steps = round(duration / settings.dt)
-        off = abs(steps * settings.dt - duration)
-        if not settings.round_horizon and (steps < 1 or off > _UNEVEN * settings.dt):
+        try:
+            if not settings.round_horizon:
+                step_count(duration, settings.dt, ROUNDED_TIMES)
+        except ValueError:
             message = (
                 f"dt = {settings.dt:g} s does not cut its {duration:g} s into whole steps: choose "
                 "another dt, or set round_horizon=true"

@@ -28,7 +28,7 @@ from mlci.simulate import step_count
 from mlci.spaces import Box, Floats, Ints
 from mlci.tabular import TabularModel
 
-_UNEVEN = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
+ROUNDED_TIMES = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
 ALPHA_BYTES = 1 << 29  # of probabilities held at once, else regions go block by block
 
 
@@ -105,7 +105,7 @@ class TrajectoryDistribution:
             raise ValueError(f"the start {task.start} lies outside the state space")
         steps = max(1, round(task.horizon / model.dt))
         if not round_horizon:
-            steps = step_count(task.horizon, model.dt, _UNEVEN)
+            steps = step_count(task.horizon, model.dt, ROUNDED_TIMES)
         ends = Ends(task.start, task.goal) if exact_ends else None
         return cls(model, start, model.grid.cells_in(task.goal), steps, ends)
 

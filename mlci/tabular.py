@@ -139,6 +139,11 @@ class TabularModel:
         for first in range(0, self.states, size):
             yield slice(first, min(first + size, self.states))
 
+    def crossed(self, cells: Ints, moves: Ints) -> Bools:
+        """(C,) which regions a trajectory of cells (T+1,) and moves (T,) crosses."""
+        rows = self.crosses[cells[:-1] * self.moves + moves]
+        return np.asarray(rows.sum(axis=0)).ravel() > 0
+
     def under(self, truth: ArrayLike) -> TabularModel:
         """The model under constraints, equation (3): moves that cross the truth are not allowed.
 

@@ -24,7 +24,7 @@ from mlci.evidence import confidence, printed_confidence
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.simulate import step_count
-from mlci.spaces import Bools, Floats, Ints
+from mlci.spaces import Bools, Floats
 from mlci.tabular import TabularModel
 
 # Probabilities are counted between these; most hypotheses are unlikely, so the first are narrow.
@@ -121,7 +121,7 @@ def _model_set(
         if not under_truth.is_possible:
             break
         cells, moves = under_truth.sample(1, rng)
-        violated.append(_crossed(point.model, cells[0], moves[0])[point.hypotheses])
+        violated.append(point.model.crossed(cells[0], moves[0])[point.hypotheses])
         avoidance.append(distribution.avoidance_probabilities()[point.hypotheses])
     shape = len(avoidance), len(point.inference.hypotheses)
     return Inference(
@@ -155,9 +155,3 @@ def _possible_task(
         f"none of {_DRAWS} tasks can be solved by the tabular agent: take a longer time step, more "
         "cells or transition.samples=3"
     )
-
-
-def _crossed(model: TabularModel, cells: Ints, moves: Ints) -> Bools:
-    """(C',) which regions a trajectory of cells (T+1,) and moves (T,) crosses."""
-    crosses = model.crosses[cells[:-1] * model.moves + moves]
-    return np.asarray(crosses.sum(axis=0)).ravel() > 0

@@ -48,8 +48,8 @@ def trajectory_tables(
     visits, crossed = [], []
     for trial, (cells, moves) in trajectories.items():
         visits += [(trial, step, cell) for step, cell in enumerate(cells)]
-        crosses = model.crosses[cells[:-1] * model.moves + moves][:, hypotheses]
-        crossed += [(trial, "sampled", i) for i in np.unique(crosses.indices)]
+        regions = model.crossed(cells, moves)[hypotheses]
+        crossed += [(trial, "sampled", i) for i in np.flatnonzero(regions)]
     for trial, regions in violated.items():
         crossed += [(trial, "demonstration", i) for i in np.flatnonzero(regions)]
     steps = {
