@@ -201,6 +201,10 @@ def test_a_truth_is_a_mask_over_the_regions() -> None:
     assert 0 < forbidden.sum() < 100
     np.testing.assert_array_equal(both.allowed, model.allowed & ~forbidden)
     np.testing.assert_array_equal(model.under(np.zeros(17, bool)).allowed, model.allowed)
+    in_turn = model.under(regions.mask(["truth"])).under(regions.mask(["5"]))
+    np.testing.assert_array_equal(in_turn.allowed, both.allowed)
+    np.testing.assert_array_equal(in_turn.truth, both.truth)
+    assert np.flatnonzero(both.truth).tolist() == [5, 16]
     for wrong in ([16], 16, np.ones(16, bool), np.ones((1, 17), bool), np.ones(17)):
         with pytest.raises(ValueError, match="mask over 17 regions needs as many truth values"):
             model.under(wrong)
