@@ -94,7 +94,7 @@ def changed(value: Any) -> Iterator[Any]:
     elif isinstance(value, bool):
         yield not value
     elif isinstance(value, str):
-        yield "escapes" if value == "equation" else f"{value}2"
+        yield {"equation": "escapes", "euler": "rk4"}.get(value, f"{value}2")
     elif isinstance(value, tuple):
         yield value[:-1] if len(value) > 1 else value * 2
     elif value is None:
