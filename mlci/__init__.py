@@ -20,6 +20,7 @@ N       --                    number of demonstrations                   --
 dt      dt                    time step of the tabular model             s
 Z       log_z[t, s]           log partition function to go               nat
 Phi     phi[i]                probability of violating region i          --
+alpha   avoidance[j, i]       probability of avoiding i, 1 - Phi         --
 D       violated[j, i]        demonstration j violates region i          --
 L       gain[i]               log likelihood gain of region i            nat
 V       values                safe set's value function                  unit of dist_K

@@ -1,4 +1,4 @@
-"""The tabular model of a continuous system (section IV) and its diagnosis.
+"""The tabular model of a continuous system (section IV).
 
 Two probabilistic models share these arrays, told apart by the number of start points a cell:
 
