@@ -19,7 +19,9 @@ from pathlib import Path
 
 from filelock import FileLock
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+# The checkout comes first: tests/ has a folder experiments/ too.
+TESTS = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(TESTS.parent), str(TESTS)]
 
 from hydra import compose, initialize_config_dir
 from sweeps import faulty, gone, running, start, tables
