@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.spaces import Box, Floats
+from mlci.spaces import Box, Floats, StateSpace
 
 REACHED = 0.05  # default distance, Euclidean in raw units, within which a state counts as met
+_SAME_TIME = 1e-3  # of a horizon: how far a duration may be off, as recorded times are rounded
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,3 +117,42 @@ class Demonstration:
     def _title(self) -> str:
         """Its name in a message."""
         return f"demonstration {self.name!r}" if self.name else "a demonstration"
+
+
+def departures(
+    task: Task, path: Floats, dt: float, space: StateSpace, tolerance: float = REACHED
+) -> list[str]:
+    """What a path does otherwise than its task says, a phrase each; empty if it does the task.
+
+    Args:
+        task: the task.
+        path: states (K+1, n) of at least two samples; it may jump in periodic dimensions.
+        dt: time between samples [s].
+        space: the state space, whose periodic dimensions are measured the short way round.
+        tolerance: how far it may start from the task's start and end from its goal, Euclidean in
+            raw units.
+    """
+    duration = (len(path) - 1) * dt
+    from_start = np.linalg.norm(space.difference(path[0], task.start))
+    from_goal = np.linalg.norm(space.excess(path[-1], task.goal))
+    phrases = []
+    if from_start > tolerance:
+        phrases.append(
+            f"it starts at {_numbers(path[0])}, {from_start:.3g} from the task's start "
+            f"{_numbers(task.start)}"
+        )
+    if from_goal > tolerance:
+        goal = _numbers(task.goal.lower)
+        if np.any(task.goal.widths > 0):
+            goal += f" to {_numbers(task.goal.upper)}"
+        phrases.append(
+            f"it ends at {_numbers(path[-1])}, {from_goal:.3g} from the task's goal {goal}"
+        )
+    if not np.isclose(duration, task.horizon, rtol=_SAME_TIME, atol=0.0):
+        phrases.append(f"it lasts {duration:.6g} s, the task {task.horizon:.6g} s")
+    return phrases
+
+
+def _numbers(state: Floats) -> str:
+    """A state (n,) in a message."""
+    return f"({', '.join(f'{value:.4g}' for value in state)})"

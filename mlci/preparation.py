@@ -14,7 +14,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
-from mlci.demonstrations import Demonstration, Task
+from mlci.demonstrations import REACHED, Demonstration, Task, departures
 from mlci.evidence import PAPER, Rates
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
@@ -54,24 +54,30 @@ class PreparedInference:
     def infer(
         self,
         paths: Sequence[ArrayLike],
+        dt: ArrayLike,
         tasks: Sequence[int] | None = None,
         *,
         names: Sequence[str] = (),
         prior_none: float = 0.5,
         rates: Rates = PAPER,
+        tolerance: float = REACHED,
     ) -> Inference:
         """Rank the hypotheses by the demonstrations that have arrived, equations (4) to (6).
 
         Args:
-            paths: states (K+1, n) of each demonstration.
+            paths: states (K+1, n) of each demonstration, sampled evenly.
+            dt: time between samples [s], of all paths or (N,) of each.
             tasks: the number of each demonstration's task, in any order and as often as it was
                 done; by default each task was done once, in order.
             names: of the demonstrations; their numbers by default.
             prior_none: prior probability that there is no constraint.
             rates: model error and rule breaking of the demonstrators.
+            tolerance: how far a path may start from its task's start and end from its goal,
+                Euclidean in raw units.
 
         Raises:
-            ValueError: a task that is not known, or not one task and name for each path.
+            ValueError: a task that is not known, not one task and name for each path, or a path
+                whose start, end or duration is not that of its task.
         """
         numbers = np.arange(len(self.tasks)) if tasks is None else np.asarray(tasks, dtype=np.int64)
         labels = tuple(names) or tuple(map(str, range(len(paths))))
@@ -84,6 +90,11 @@ class PreparedInference:
             raise ValueError(
                 f"tasks are numbered 0 to {len(self.tasks) - 1}, not {numbers.tolist()}"
             )
+        steps = np.broadcast_to(np.asarray(dt, dtype=float), numbers.shape)
+        paths = [
+            self._path(path, float(step), number, name, tolerance)
+            for path, step, number, name in zip(paths, steps, numbers.tolist(), labels, strict=True)
+        ]
         return Inference(
             self.hypotheses,
             labels,
@@ -93,6 +104,20 @@ class PreparedInference:
             prior_none,
             rates,
         )
+
+    def _path(self, path: ArrayLike, dt: float, number: int, name: str, tolerance: float) -> Floats:
+        """A path (K+1, n), checked to be of a task by its number."""
+        space, states = self.hypotheses.space, np.asarray(path, dtype=float)
+        if states.ndim != 2 or len(states) < 2 or states.shape[1] != space.dimension:
+            raise ValueError(
+                f"path {name!r} needs states of shape (K+1, {space.dimension}) with K >= 1, not "
+                f"{states.shape}"
+            )
+        if not np.all(np.isfinite(states)):
+            raise ValueError(f"path {name!r} has states that are not finite")
+        if phrases := departures(self.tasks[number], states, dt, space, tolerance):
+            raise ValueError(f"path {name!r} does not do task {number}: {'; '.join(phrases)}")
+        return states
 
 
 def infer(
@@ -104,6 +129,7 @@ def infer(
     rates: Rates = PAPER,
     round_horizon: bool = False,
     exact_ends: bool = False,
+    tolerance: float = REACHED,
     n_jobs: int = 1,
     progress: Progress | None = None,
 ) -> Inference:
@@ -118,12 +144,13 @@ def infer(
         round_horizon: take the nearest number of time steps where dt does not divide a duration.
         exact_ends: let trajectories begin and end at states, not at cells as the paper does, so
             that a region is not certain to be entered only because it holds a cell's centre.
+        tolerance: how far a demonstration may end from its task's goal, Euclidean in raw units.
         n_jobs: tasks that are worked on at once; -1 is one a core. The result is the same.
         progress: called with how many tasks are done, and of how many.
 
     Raises:
-        ValueError: a start outside the state space, a duration that dt does not divide, or a mask
-            of the wrong shape.
+        ValueError: a start outside the state space, a duration that dt does not divide, a mask of
+            the wrong shape, or a demonstration that does not end at its task's goal.
     """
     prepared = prepare(
         model,
@@ -138,7 +165,14 @@ def infer(
     names = [
         demonstration.name or str(number) for number, demonstration in enumerate(demonstrations)
     ]
-    return prepared.infer(paths, names=names, prior_none=prior_none, rates=rates)
+    return prepared.infer(
+        paths,
+        [demonstration.dt for demonstration in demonstrations],
+        names=names,
+        prior_none=prior_none,
+        rates=rates,
+        tolerance=tolerance,
+    )
 
 
 def prepare(

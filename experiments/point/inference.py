@@ -67,7 +67,13 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         for number in numbers
     )
     hypotheses = model.regions.mask(settings.candidates.names)
-    inference = infer(model, paths, hypotheses=hypotheses, prior_none=settings.inference.prior)
+    inference = infer(
+        model,
+        paths,
+        hypotheses=hypotheses,
+        prior_none=settings.inference.prior,
+        tolerance=settings.demonstrations.goal_tolerance,
+    )
     return PointInference(
         trials=trials,
         numbers=numbers,

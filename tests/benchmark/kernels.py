@@ -106,7 +106,7 @@ def telescope_rows(settings: Settings, samples: int) -> list[Row]:
     )
     label = "telescope" + (f"_samples{samples}" if samples > 1 else "")
     prepared, paths = prepare(model, tasks), [each.states for each in demonstrations]
-    recorded = sum(len(path) for path in paths)
+    recorded, steps = sum(len(path) for path in paths), [each.dt for each in demonstrations]
     return [
         Row(
             f"{label}_discretize",
@@ -126,7 +126,7 @@ def telescope_rows(settings: Settings, samples: int) -> list[Row]:
         ),
         Row(
             f"{label}_rank_prepared_5",
-            median_seconds(lambda: prepared.infer(paths).ranking, 101),
+            median_seconds(lambda: prepared.infer(paths, steps).ranking, 101),
             float("nan"),
             101,
             f"5 demonstrations ({recorded} samples) to ranks, tasks known in advance: {what}",
@@ -134,7 +134,7 @@ def telescope_rows(settings: Settings, samples: int) -> list[Row]:
         ),
         Row(
             f"{label}_rank_prepared_1",
-            median_seconds(lambda: prepared.infer(paths[:1], [0]).ranking, 101),
+            median_seconds(lambda: prepared.infer(paths[:1], steps[:1], [0]).ranking, 101),
             float("nan"),
             101,
             f"the same for one demonstration: {what}",

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlci.demonstrations import Demonstration, Task
+from mlci.demonstrations import REACHED, Demonstration, Task, departures
 from mlci.evidence import Ranking, Rates, log_evidence, rank_constraints
 from mlci.grids import Grid
 from mlci.inference import Inference
@@ -16,7 +16,7 @@ from mlci.preparation import PreparedInference, infer, prepare
 from mlci.regions import Regions
 from mlci.simulate import rollout
 from mlci.spaces import Box
-from mlci.systems import DoubleIntegrator
+from mlci.systems import DoubleIntegrator, Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize
 
 SYSTEM = DoubleIntegrator()
@@ -45,10 +45,11 @@ def prepared(model: TabularModel) -> PreparedInference:
 
 
 def demonstration(task: int, seed: int) -> Demonstration:
-    """A path that begins where a task does, with random controls."""
+    """A path of a task, with random controls, bent so that it ends at the goal."""
     rng = np.random.default_rng([task, seed])
     count = round(TASKS[task].horizon / 0.01)
     path = rollout(SYSTEM, TASKS[task].start, rng.uniform(-0.6, 0.6, (count, 1)), 0.01)
+    path += np.linspace(0, 1, count + 1)[:, None] * (TASKS[task].goal.lower - path[-1])
     return Demonstration(TASKS[task], path, None, 0.01, f"path {task}.{seed}")
 
 
@@ -83,11 +84,13 @@ def test_infer_is_the_ranking_of_each_task_alone(model: TabularModel) -> None:
 def test_prepared_tasks_give_the_same(model: TabularModel, prepared: PreparedInference) -> None:
     demonstrations = [demonstration(task, seed) for seed, task in enumerate([2, 0, 2, 3])]
     paths = [each.states for each in demonstrations]
-    ready = prepared.infer(paths, [2, 0, 2, 3], prior_none=0.3)
+    ready = prepared.infer(paths, 0.01, [2, 0, 2, 3], prior_none=0.3)
     assert_same(ready.ranking, infer(model, demonstrations, prior_none=0.3).ranking)
     assert ready.names == ("0", "1", "2", "3")
     once = [demonstration(task, 0).states for task in range(4)]
-    assert_same(prepared.infer(once).ranking, prepared.infer(once, [0, 1, 2, 3]).ranking)
+    assert_same(
+        prepared.infer(once, 0.01).ranking, prepared.infer(once, [0.01] * 4, [0, 1, 2, 3]).ranking
+    )
 
 
 def test_any_number_of_jobs_gives_the_same_bits(model: TabularModel) -> None:
@@ -162,14 +165,14 @@ def test_repr_and_summary_say_what_was_inferred_and_what_is_doubtful() -> None:
 def test_wrong_input_is_refused(model: TabularModel, prepared: PreparedInference) -> None:
     path = demonstration(0, 0).states
     with pytest.raises(ValueError, match=r"2 paths need as many tasks and names, not \[1\]"):
-        prepared.infer([path, path], [1])
+        prepared.infer([path, path], 0.01, [1])
     with pytest.raises(ValueError, match=r"1 paths need as many tasks .* not \[0, 1, 2, 3\]"):
-        prepared.infer([path])
+        prepared.infer([path], 0.01)
     with pytest.raises(ValueError, match=r"1 paths need .* and \['a', 'b'\]"):
-        prepared.infer([path], [0], names=["a", "b"])
+        prepared.infer([path], 0.01, [0], names=["a", "b"])
     for wrong in (4, -1):
         with pytest.raises(ValueError, match=rf"numbered 0 to 3, not \[{wrong}\]"):
-            prepared.infer([path], [wrong])
+            prepared.infer([path], 0.01, [wrong])
     fewer = Regions.from_grid(SYSTEM.space, (5, 5))
     with pytest.raises(
         ValueError, match=r"avoidance \(4, 100\) .* do not fit 4 tasks and 25 hypotheses"
@@ -187,6 +190,48 @@ def test_wrong_input_is_refused(model: TabularModel, prepared: PreparedInference
     }.items():
         with pytest.raises(ValueError, match="do not fit avoidance"):
             replace(inference, **{field: value})
+
+
+def test_a_path_of_another_task_is_refused_with_all_that_differs(
+    prepared: PreparedInference,
+) -> None:
+    path = demonstration(0, 0).states
+    with pytest.raises(ValueError, match="path 'bad' does not do task 1") as refusal:
+        prepared.infer([path, path[:-10] + 0.1], 0.01, [0, 1], names=["good", "bad"])
+    for part in (
+        "it starts at (-0.9, 0.1), 2.93 from the task's start (2, 0.5)",
+        "from the task's goal (-1, 0)",
+        "it lasts 4.9 s, the task 5 s",
+    ):
+        assert part in str(refusal.value)
+    with pytest.raises(ValueError, match=r"'0' .* it lasts 10 s, the task 5 s$"):
+        prepared.infer([path], 0.02, [0])
+    for wrong in (path[0], path[:1], path[:, :1]):
+        with pytest.raises(ValueError, match=r"path '0' needs states of shape \(K\+1, 2\)"):
+            prepared.infer([wrong], 0.01, [0])
+    with pytest.raises(ValueError, match="path '0' has states that are not finite"):
+        prepared.infer([np.where(np.arange(len(path))[:, None] == 7, np.nan, path)], 0.01, [0])
+
+
+def test_a_path_ends_in_its_goal_the_short_way_round_and_within_the_tolerance() -> None:
+    """A goal on the seam of an angle, reached after a turn; the other dimension is free."""
+    space = Pendulum().space
+    task = Task(np.array([6.0, 0.0]), Box([-0.1, -np.inf], [0.1, np.inf]), 1.0)
+    path = np.linspace([6.0, 0.0], [2 * np.pi + 0.1 + REACHED, 3.0], 11)
+    assert departures(task, path, 0.1, space, REACHED + 1e-9) == []
+    assert departures(task, space.wrap(path), 0.1, space, REACHED + 1e-9) == []
+    (phrase,) = departures(task, path, 0.1, space, REACHED - 1e-9)
+    assert phrase == "it ends at (6.433, 3), 0.05 from the task's goal (-0.1, -inf) to (0.1, inf)"
+    assert departures(task, path, 0.1 * 1.0009, space, 0.06) == []
+    assert departures(task, path, 0.1 * 1.0011, space, 0.06) == ["it lasts 1.0011 s, the task 1 s"]
+
+
+def test_a_demonstration_that_ends_elsewhere_is_refused(model: TabularModel) -> None:
+    path = demonstration(0, 0).states
+    stray = Demonstration(TASKS[0], path + np.linspace(0, 0.2, len(path))[:, None], None, 0.01)
+    with pytest.raises(ValueError, match=r"'0' does not do task 0: it ends at \(1.2, 0.2\), 0.283"):
+        infer(model, [stray])
+    assert len(infer(model, [stray], tolerance=0.3).names) == 1
 
 
 def test_no_demonstration_leaves_the_prior(model: TabularModel) -> None:

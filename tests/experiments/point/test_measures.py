@@ -60,7 +60,7 @@ def point() -> PointInference:
         model=model,
         hypotheses=hypotheses,
         truth=regions.mask(["truth_0"]),
-        inference=infer(model, demonstrations(), hypotheses=hypotheses),
+        inference=infer(model, demonstrations(), hypotheses=hypotheses, tolerance=1.0),
         diagnosis=diagnose(model),
     )
 
