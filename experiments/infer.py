@@ -61,6 +61,8 @@ def infer(settings: RecordedSettings) -> int:
         model,
         demonstrations,
         prior_none=settings.inference.prior,
+        rates=settings.inference.rates,
+        exact_ends=settings.inference.exact_ends,
         round_horizon=settings.round_horizon,
     )
     ranking = ranking_table(inference)

@@ -52,6 +52,7 @@ class Rates:
 
 
 PAPER = Rates()
+DEFAULT_MODEL_ERROR = 0.1  # where no forecasts have been scored; the ratio itself favours 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from mlci.demonstrations import REACHED, Demonstration, Task, departures
-from mlci.evidence import PAPER, Rates
+from mlci.evidence import DEFAULT_MODEL_ERROR, Rates
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions, as_mask
@@ -59,7 +59,7 @@ class PreparedInference:
         *,
         names: Sequence[str] = (),
         prior_none: float = 0.5,
-        rates: Rates = PAPER,
+        rates: Rates | None = None,
         tolerance: float = REACHED,
     ) -> Inference:
         """Rank the hypotheses by the demonstrations that have arrived, equations (4) to (6).
@@ -71,7 +71,8 @@ class PreparedInference:
                 done; by default each task was done once, in order.
             names: of the demonstrations; their numbers by default.
             prior_none: prior probability that there is no constraint.
-            rates: model error and rule breaking of the demonstrators.
+            rates: model error and rule breaking of the demonstrators; None takes the default
+                model error, and no rule breaking.
             tolerance: how far a path may start from its task's start and end from its goal,
                 Euclidean in raw units.
 
@@ -102,7 +103,7 @@ class PreparedInference:
             _violations(self.hypotheses, paths),
             self.reachable[numbers],
             prior_none,
-            rates,
+            Rates(DEFAULT_MODEL_ERROR) if rates is None else rates,
         )
 
     def _path(self, path: ArrayLike, dt: float, number: int, name: str, tolerance: float) -> Floats:
@@ -126,9 +127,9 @@ def infer(
     *,
     hypotheses: ArrayLike | None = None,
     prior_none: float = 0.5,
-    rates: Rates = PAPER,
+    rates: Rates | None = None,
     round_horizon: bool = False,
-    exact_ends: bool = False,
+    exact_ends: bool = True,
     tolerance: float = REACHED,
     n_jobs: int = 1,
     progress: Progress | None = None,
@@ -140,10 +141,11 @@ def infer(
         demonstrations: N demonstrations, each with a task of its own.
         hypotheses: (C,) mask over the model's regions; None takes all.
         prior_none: prior probability that there is no constraint.
-        rates: model error and rule breaking of the demonstrators.
+        rates: model error and rule breaking of the demonstrators; None takes the default model
+            error, and no rule breaking.
         round_horizon: take the nearest number of time steps where dt does not divide a duration.
-        exact_ends: let trajectories begin and end at states, not at cells as the paper does, so
-            that a region is not certain to be entered only because it holds a cell's centre.
+        exact_ends: let trajectories begin and end at states, so that a region is not certain to be
+            entered only because it holds a cell's centre. The paper's begin and end at cells.
         tolerance: how far a demonstration may end from its task's goal, Euclidean in raw units.
         n_jobs: tasks that are worked on at once; -1 is one a core. The result is the same.
         progress: called with how many tasks are done, and of how many.
@@ -181,7 +183,7 @@ def prepare(
     *,
     hypotheses: ArrayLike | None = None,
     round_horizon: bool = False,
-    exact_ends: bool = False,
+    exact_ends: bool = True,
     n_jobs: int = 1,
     progress: Progress | None = None,
 ) -> PreparedInference:

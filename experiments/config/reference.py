@@ -28,7 +28,12 @@ COMMANDS: dict[str, Any] = {
     "infer": RecordedSettings,
     "advise": AdviceSettings,
 }
-_GROUPS = ("system", "truth", "grid")  # whose files set values of which each command has one
+_GROUPS = (
+    "system",
+    "truth",
+    "grid",
+    "inference",
+)  # whose files set values of which each command has one
 _BOUNDS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
 _TYPES = {
     "integer": "whole number",

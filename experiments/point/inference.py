@@ -72,6 +72,8 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         paths,
         hypotheses=hypotheses,
         prior_none=settings.inference.prior,
+        rates=settings.inference.rates,
+        exact_ends=settings.inference.exact_ends,
         tolerance=settings.demonstrations.goal_tolerance,
     )
     return PointInference(

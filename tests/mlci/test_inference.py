@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from mlci.demonstrations import REACHED, Demonstration, Task, departures
-from mlci.evidence import Ranking, Rates, log_evidence, rank_constraints
+from mlci.evidence import DEFAULT_MODEL_ERROR, PAPER, Ranking, Rates, log_evidence, rank_constraints
 from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
@@ -34,6 +35,10 @@ TASKS = [
 ]
 
 
+# Trajectories from cell to cell, and probabilities as the tabular model has them.
+papers = partial(infer, rates=PAPER, exact_ends=False)
+
+
 @pytest.fixture(scope="module")
 def model() -> TabularModel:
     return discretize(SYSTEM, GRID, action_grid(SYSTEM, 5), 0.5, HYPOTHESES)
@@ -41,7 +46,7 @@ def model() -> TabularModel:
 
 @pytest.fixture(scope="module")
 def prepared(model: TabularModel) -> PreparedInference:
-    return prepare(model, TASKS)
+    return prepare(model, TASKS, exact_ends=False)
 
 
 def demonstration(task: int, seed: int) -> Demonstration:
@@ -71,7 +76,7 @@ def by_hand(model: TabularModel, demonstrations: list[Demonstration], prior_none
 def test_infer_is_the_ranking_of_each_task_alone(model: TabularModel) -> None:
     """A task done twice, one never, one whose goal cannot be reached; paths of several lengths."""
     demonstrations = [demonstration(task, seed) for seed, task in enumerate([2, 0, 2, 3])]
-    inference = infer(model, demonstrations, prior_none=0.3)
+    inference = papers(model, demonstrations, prior_none=0.3)
     assert inference.reachable.tolist() == [True, True, True, False]
     assert not inference.phi[3].any()
     assert inference.names == ("path 2.0", "path 0.1", "path 2.2", "path 3.3")
@@ -84,8 +89,8 @@ def test_infer_is_the_ranking_of_each_task_alone(model: TabularModel) -> None:
 def test_prepared_tasks_give_the_same(model: TabularModel, prepared: PreparedInference) -> None:
     demonstrations = [demonstration(task, seed) for seed, task in enumerate([2, 0, 2, 3])]
     paths = [each.states for each in demonstrations]
-    ready = prepared.infer(paths, 0.01, [2, 0, 2, 3], prior_none=0.3)
-    assert_same(ready.ranking, infer(model, demonstrations, prior_none=0.3).ranking)
+    ready = prepared.infer(paths, 0.01, [2, 0, 2, 3], prior_none=0.3, rates=PAPER)
+    assert_same(ready.ranking, papers(model, demonstrations, prior_none=0.3).ranking)
     assert ready.names == ("0", "1", "2", "3")
     once = [demonstration(task, 0).states for task in range(4)]
     assert_same(
@@ -96,7 +101,7 @@ def test_prepared_tasks_give_the_same(model: TabularModel, prepared: PreparedInf
 def test_any_number_of_jobs_gives_the_same_bits(model: TabularModel) -> None:
     fresh, calls = replace(model), []
     in_parallel = prepare(fresh, TASKS, n_jobs=2, progress=lambda *count: calls.append(count))
-    alone = prepare(model, TASKS)
+    alone = prepare(replace(model), TASKS)
     np.testing.assert_array_equal(in_parallel.avoidance, alone.avoidance)
     np.testing.assert_array_equal(in_parallel.reachable, alone.reachable)
     assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
@@ -116,7 +121,7 @@ def test_only_the_hypotheses_of_a_mask_are_ranked() -> None:
 
 def test_some_of_the_demonstrations(model: TabularModel) -> None:
     demonstrations = [demonstration(task, seed) for seed, task in enumerate([2, 0, 3, 2])]
-    inference = infer(model, demonstrations, prior_none=0.2)
+    inference = papers(model, demonstrations, prior_none=0.2)
     for part, numbers in ((slice(2), [0, 1]), ([3, 1], [3, 1])):
         chosen = [demonstrations[number] for number in numbers]
         assert_same(inference.of(part).ranking, by_hand(model, chosen, 0.2))
@@ -249,5 +254,9 @@ def test_exact_ends_and_rates_reach_the_evidence(model: TabularModel) -> None:
     evidence = log_evidence(exact.avoidance, exact.violated, Rates(0.1, 0.05))
     np.testing.assert_array_equal(exact.evidence, evidence)
     np.testing.assert_allclose(exact.gain, evidence.sum(axis=0), rtol=1e-12)
-    assert not np.array_equal(exact.avoidance, infer(model, demonstrations).avoidance)
+    assert not np.array_equal(exact.avoidance, papers(model, demonstrations).avoidance)
     assert exact.of([1]).rates == Rates(0.1, 0.05)
+    default = infer(model, demonstrations)
+    np.testing.assert_array_equal(default.avoidance, exact.avoidance)
+    assert default.rates == Rates(model_error=DEFAULT_MODEL_ERROR)
+    assert 0 < np.max(default.evidence) <= -np.log(DEFAULT_MODEL_ERROR)

@@ -22,6 +22,7 @@ from experiments.config.settings.kinds import (
     Word,
     about,
 )
+from mlci.evidence import Rates
 from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 
@@ -206,9 +207,28 @@ class SafetySettings:
 
 @dataclass(frozen=True, config=STRICT)
 class InferenceSettings:
-    """Beliefs before any demonstration."""
+    """What is believed before any demonstration, and how much each of them says."""
 
     prior: Annotated[Probability, about("probability that there is no constraint at all")]
+    exact_ends: Annotated[
+        Flag, about("trajectories of the tabular model begin and end at states, not at cells")
+    ]
+    calibrate: Annotated[
+        Flag,
+        about(
+            "whether probabilities of the tabular model are mapped to what simulated "
+            "demonstrators do; `model_error` is for where they are not"
+        ),
+    ]
+    model_error: Annotated[
+        Share, about("share of demonstrations that say nothing by what they avoid")
+    ]
+    rule_breaking: Annotated[Share, about("share of demonstrations that ignore the constraint")]
+
+    @property
+    def rates(self) -> Rates:
+        """The rates, where probabilities are not calibrated."""
+        return Rates(self.model_error, self.rule_breaking)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -10,20 +10,29 @@ import numpy as np
 from experiments.config.settings import Settings
 from experiments.point.inference import infer_point
 from experiments.tracking.store import Store
+from mlci.evidence import Rates
 from mlci.preparation import infer
 
 
 def test_settings_reach_the_inference(settings: Settings, tmp_path: Path) -> None:
-    prior = dataclasses.replace(settings.inference, prior=0.3)
-    settings = dataclasses.replace(settings, inference=prior)
-    point = infer_point(settings, Store(tmp_path))
+    changed = dataclasses.replace(
+        settings.inference, prior=0.3, exact_ends=False, model_error=0.2, rule_breaking=0.05
+    )
+    point = infer_point(dataclasses.replace(settings, inference=changed), Store(tmp_path))
     assert point.inference.prior_none == 0.3
+    assert point.inference.rates == Rates(model_error=0.2, rule_breaking=0.05)
     assert point.inference.hypotheses.names == settings.candidates.names
     assert [name for name, true in zip(point.model.regions.names, point.truth, strict=True) if true]
     assert not np.any(point.truth & point.hypotheses)
     assert np.all(point.truth | point.hypotheses)
-    again = infer(point.model, point.demonstrations, hypotheses=point.hypotheses)
+    again, exact = (
+        infer(point.model, point.demonstrations, hypotheses=point.hypotheses, exact_ends=ends)
+        for ends in (False, True)
+    )
     np.testing.assert_array_equal(again.phi, point.inference.phi)
+    with_defaults = infer_point(settings, Store(tmp_path)).inference
+    np.testing.assert_array_equal(exact.evidence, with_defaults.evidence)
+    assert not np.array_equal(exact.phi, again.phi)
     trials = point.trials
     for number, demonstration in zip(point.numbers, point.demonstrations, strict=True):
         assert trials.outcome[number] == "kept"

@@ -33,6 +33,8 @@ def walled(settings: Settings, low: float, high: float, keep: int = 8) -> Settin
     ranks = RankSettings(demonstrations=4, subsets=12, top=5)
     fine = dataclasses.replace(settings.grid, shape=(16, 8))
     settings = dataclasses.replace(settings, grid=fine, dt=0.4, horizon=4.0)
+    evidence = dataclasses.replace(settings.inference, exact_ends=False, model_error=0.0)
+    settings = dataclasses.replace(settings, inference=evidence)
     return dataclasses.replace(settings, truth=truth, demonstrations=more, ranks=ranks)
 
 
