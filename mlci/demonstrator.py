@@ -12,6 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mlci.control_problem import ControlFilter
 from mlci.demonstrations import REACHED, Demonstration, Task
@@ -33,6 +34,7 @@ class Trial:
     Attributes:
         task: the task.
         guesses: (R, K, m) one control sequence a restart.
+        noise: (K, m) on the controls when the best that was found is carried out, see `optimize`.
 
     Raises:
         ValueError: guesses that are empty or do not have three axes.
@@ -40,6 +42,7 @@ class Trial:
 
     task: Task
     guesses: Floats
+    noise: Floats | None = None
 
     def __post_init__(self) -> None:
         if self.guesses.ndim != 3 or not self.guesses.size:
@@ -89,6 +92,7 @@ def sample_trials(
     goal_offsets: Box | None = None,
     restarts: int = 3,
     hold: float = 0.5,
+    control_noise: ArrayLike | None = None,
 ) -> list[Trial]:
     """Draw tasks, uniformly among safe starts and goals, and first guesses for them.
 
@@ -107,6 +111,9 @@ def sample_trials(
         goal_offsets: the goal region, relative to the goal state that was drawn; None for a point.
         restarts: R, guesses for each trial.
         hold: time for which a guess holds a control [s].
+        control_noise: (m,) root of the power of white noise on the controls, in their unit times
+            the root of a second: a sample has this by the root of dt for standard deviation. None
+            for no noise.
 
     Raises:
         ValueError: a horizon that dt does not divide, or a start box with no safe state.
@@ -126,7 +133,10 @@ def sample_trials(
         levels = rng.uniform(low, high, size=(restarts, -(-steps // per_hold), m))
         guesses = np.repeat(levels, per_hold, axis=1)[:, :steps]
         task = Task(start, Box(goal + offsets.lower, goal + offsets.upper), horizon)
-        drawn.append(Trial(task, guesses))
+        noise = None
+        if control_noise is not None:
+            noise = rng.standard_normal((steps, m)) * np.asarray(control_noise) / np.sqrt(dt)
+        drawn.append(Trial(task, guesses, noise))
     return drawn
 
 
@@ -150,7 +160,7 @@ def demonstrate(
     if none could, the cheapest.
 
     Args:
-        trials: at least one; all with guesses of one shape.
+        trials: at least one; all with guesses of one shape, and all with noise or none.
         truth: the regions that the demonstrator may not enter.
         safety_filter: keeps it out of them; None lets it go anywhere.
         dt: sampling time [s].
@@ -165,6 +175,7 @@ def demonstrate(
         One attempt a trial, in their order.
     """
     tasks, restarts = [trial.task for trial in trials], len(trials[0].guesses)
+    noises = [trial.noise for trial in trials if trial.noise is not None]
     solution = optimize(
         system,
         np.repeat([task.start for task in tasks], restarts, axis=0),
@@ -178,6 +189,7 @@ def demonstrate(
         wind=wind,
         limit=limit,
         integrator=integrator,
+        noise=np.repeat(noises, restarts, axis=0) if noises else None,
     )
     misses = np.linalg.norm(solution.excess, axis=-1)
     entered = np.zeros(len(misses), dtype=bool)

@@ -9,7 +9,7 @@ behaviors through online trajectory optimization"). `control_problem` states wha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,7 +52,7 @@ class Solution:
 
     @property
     def cost(self) -> Floats:
-        """(B,) final cost: minus the reward on the way, plus the goal's penalty."""
+        """(B,) final cost, without noise: minus the reward on the way, plus the goal's penalty."""
         return self.costs[-1]
 
 
@@ -71,6 +71,7 @@ def optimize(
     wind: bool = True,
     limit: Box | None = None,
     integrator: Integrator = EULER,
+    noise: Floats | None = None,
 ) -> Solution:
     """Solve (8) for every member of a batch, from its own first guess.
 
@@ -88,6 +89,8 @@ def optimize(
         wind: whether any number of turns may lead to the goal.
         limit: range of the controls.
         integrator: how states move on in a time step.
+        noise: (B, K, m) on the controls when the optimum is carried out. Nobody knows it before,
+            and the optimum's feedback corrects what it does; limit and filter follow it.
 
     Raises:
         ValueError: shapes that disagree, or a goal side with one infinite end.
@@ -101,6 +104,8 @@ def optimize(
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging candidate is not an error
         paths = _first_paths(problem, np.moveaxis(controls, 1, 0))
         costs = _iterate(problem, paths, iterations, tolerance)
+        if noise is not None:
+            paths = _carry_out(problem, paths, np.moveaxis(noise, 1, 0))
     return Solution(
         np.moveaxis(paths.states, 0, 1).copy(),
         np.moveaxis(paths.applied, 0, 1).copy(),
@@ -115,6 +120,13 @@ def _first_paths(problem: ControlProblem, guess: Floats) -> Paths:
     around = Paths(zero, guess, guess, np.zeros(guess.shape[1]))
     gain = np.zeros((*guess.shape, zero.shape[-1]))
     return _roll_out(problem, around, 0 * guess, gain, _STEP_SIZES[:1]).of(0)
+
+
+def _carry_out(problem: ControlProblem, paths: Paths, noise: Floats) -> Paths:
+    """The paths under noise (K, B, m) on the controls, with the feedback of the last iteration."""
+    shift, gain = feedback(problem, paths, np.full(len(problem.starts), _FLOOR))
+    around = replace(paths, wanted=paths.wanted + noise)
+    return _roll_out(problem, around, 0 * shift, gain, _STEP_SIZES[:1]).of(0)
 
 
 def _iterate(problem: ControlProblem, paths: Paths, iterations: int, tolerance: float) -> Floats:

@@ -120,20 +120,26 @@ class FunctionSystem(System):
 class Pendulum(System):
     """theta'' = g / l sin(theta) + u, equation (7); theta = 0 is upright.
 
+    With drag and another mass it is g / l sin(theta) - drag theta' + u / mass.
+
     Attributes:
         speed_limit: bound on |theta'| [rad/s].
         control_limit: bound on |u| [rad/s^2].
         gravity: g [m/s^2].
         length: l [m].
+        drag: what slows it down [1/s].
+        mass: as a multiple of the mass that u accelerates by u.
     """
 
     speed_limit: float = 6.0
     control_limit: float = 2.0
     gravity: float = 1.0
     length: float = 1.0
+    drag: float = 0.0
+    mass: float = 1.0
 
     def __post_init__(self) -> None:
-        _require_positive(self, "speed_limit", "control_limit", "length")
+        _require_positive(self, "speed_limit", "control_limit", "length", "mass")
 
     @cached_property
     def space(self) -> StateSpace:
@@ -147,8 +153,9 @@ class Pendulum(System):
         return Box(np.array([-self.control_limit]), np.array([self.control_limit]))
 
     def dynamics(self, states: Floats, controls: Floats) -> Floats:
-        fall = self.gravity / self.length * np.sin(states[..., 0])
-        speed, acceleration = np.broadcast_arrays(states[..., 1], fall + controls[..., 0])
+        passive = self.gravity / self.length * np.sin(states[..., 0]) - self.drag * states[..., 1]
+        push = controls[..., 0] / self.mass
+        speed, acceleration = np.broadcast_arrays(states[..., 1], passive + push)
         return np.stack([speed, acceleration], axis=-1)
 
     def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
@@ -156,7 +163,8 @@ class Pendulum(System):
         by_state = np.zeros((*batch, 2, 2))
         by_state[..., 0, 1] = 1.0
         by_state[..., 1, 0] = self.gravity / self.length * np.cos(states[..., 0])
-        by_control = np.broadcast_to(np.array([[0.0], [1.0]]), (*batch, 2, 1))
+        by_state[..., 1, 1] = -self.drag
+        by_control = np.broadcast_to(np.array([[0.0], [1 / self.mass]]), (*batch, 2, 1))
         return by_state, by_control
 
 

@@ -22,6 +22,7 @@ MLCI = {
     "mlci.differences": "mlci.spaces",
     "mlci.systems": "mlci.differences",
     "mlci.system_check": "mlci.systems",
+    "mlci.effort": "mlci.systems",
     "mlci.simulate": "mlci.systems",
     "mlci.reachability": "mlci.regions mlci.system_check",
     "mlci.constant_controls": "mlci.reachability mlci.simulate",

@@ -84,7 +84,7 @@ def _lines(error: ValidationError, kind: Any, tree: Mapping[str, Any]) -> Iterat
 def _unknown(place: list[Any], kind: Any, tree: Mapping[str, Any]) -> str:
     """What to say about a key that nobody knows."""
     *parents, name = place
-    if parents == ["system"]:
+    if parents in (["system"], ["reality", "system"]):
         system = system_class(tree["system"]["_target_"])
         known = did_you_mean(name, inspect.signature(system).parameters)
         return f"{system.__name__} has no such argument{known}"

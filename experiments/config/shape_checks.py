@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from experiments.config.settings import (
     AdviceSettings,
     GridSettings,
@@ -34,6 +36,7 @@ def point_shape_problems(settings: Settings) -> Iterator[str]:
     yield from _task_region_problems(settings.tasks, space)
     for i, region in enumerate(settings.truth.boxes):
         yield from _region_problems(f"truth.boxes[{i}]", region, space)
+    yield from _reality_problems(settings)
 
 
 def advice_shape_problems(settings: AdviceSettings) -> Iterator[str]:
@@ -53,6 +56,32 @@ def recorded_shape_problems(settings: RecordedSettings) -> Iterator[str]:
         yield from _length_problems("start", settings.start, space)
     if settings.goal is not None:
         yield from _region_problems("goal", settings.goal, space, point=True)
+
+
+def _reality_problems(settings: Settings) -> Iterator[str]:
+    """A reality in another state space, or lists that do not match states and controls."""
+    reality, nominal, real = settings.reality, settings.model, settings.real_system.build()
+    space, controls = nominal.space, nominal.control_box.dimension
+    for one, other in ((space.bounds, real.space.bounds), (nominal.control_box, real.control_box)):
+        if not (np.array_equal(one.lower, other.lower) and np.array_equal(one.upper, other.upper)):
+            yield (
+                f"reality.system: {dict(reality.system or {})} changes the range of states or "
+                "controls; change that in `system`"
+            )
+            return
+    for key, of, entries in (
+        ("effort", "state and control", reality.effort),
+        ("control_noise", "control", reality.control_noise),
+        ("sensor_noise", "state", reality.sensor_noise),
+    ):
+        number = space.dimension * ("state" in of) + controls * ("control" in of)
+        if entries is not None and len(entries) != number:
+            yield f"reality.{key}: {list(entries)} must have {number} entries, one a {of}"
+        elif key == "effort" and np.any(
+            np.array(entries or [0])[: space.dimension] * space.periodic
+        ):
+            turning = " and ".join(np.array(space.names)[space.periodic])
+            yield f"reality.effort: the square of {turning}, which goes round, jumps; price it at 0"
 
 
 def _grid_problems(grid: GridSettings, space: StateSpace) -> Iterator[str]:

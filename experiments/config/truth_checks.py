@@ -23,6 +23,11 @@ def truth_problems(settings: Settings) -> Iterator[str]:
     truth, calibration = settings.truth, settings.calibration
     if settings.tasks.crossing and truth.name == NO_TRUTH:
         yield "tasks.crossing: true, but no truth is there to cross; set it to false"
+    if settings.demonstrations.rule_breaking and truth.name == NO_TRUTH:
+        yield (
+            f"demonstrations.rule_breaking: {settings.demonstrations.rule_breaking}, but no truth "
+            "is there to break; set it to 0"
+        )
     nothing = not truth.boxes and truth.cell is None
     if nothing and truth.name != NO_TRUTH:
         yield (
@@ -65,7 +70,7 @@ def safe_set_problems(settings: Settings) -> Iterator[str]:
     safety, space = settings.safety, settings.model.space
     if len(settings.constraint):
         try:
-            check_affine(settings.model)
+            check_affine(settings.real_model)
         except ValueError as error:
             yield f"truth: {settings.truth.name} needs a safe set, but {error}; or take truth=none"
     widest = float(np.max(space.bounds.widths))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.config.settings import Settings
-from experiments.point.stages import TrialSet, demonstrations, tabular_model
+from experiments.point.stages import tabular_model
+from experiments.point.trials import TrialSet, demonstrations
 from experiments.tracking.store import Store
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose

@@ -17,6 +17,8 @@ class Purpose(IntEnum):
     ROLLOUTS = 0
     SUBSETS = 1
     MODEL_DEMONSTRATIONS = 2
+    RULE_BREAKING = 3
+    SENSOR_NOISE = 4
 
 
 def stream(seed: int, purpose: Purpose, *index: int) -> np.random.Generator:

@@ -85,6 +85,7 @@ def _trial_table(point: PointInference, measures: Measures, covered: np.ndarray)
     return pd.DataFrame(
         {
             "trial": point.numbers,
+            "rule_breaking": point.trials.rule_breaking[point.numbers],
             "reachable": point.inference.reachable,
             "feasible": measures.feasible,
             "final_state_error": measures.final_state_error,

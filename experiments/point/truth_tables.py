@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
-from experiments.point.stages import TrialSet
+from experiments.point.trials import TrialSet
 from mlci.regions import Regions
 from mlci.spaces import Ints, StateSpace
 
@@ -37,6 +37,7 @@ def truth_tables(settings: Settings, trials: TrialSet, numbers: Ints) -> dict[st
             {
                 "trial": np.arange(len(trials.outcome)),
                 "outcome": trials.outcome,
+                "rule_breaking": trials.rule_breaking,
                 "cost": trials.cost,
                 "goal_distance": trials.miss,
                 "peak_control": np.max(np.abs(trials.controls), axis=(1, 2)),

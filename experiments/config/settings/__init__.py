@@ -16,6 +16,7 @@ from experiments.config.settings.parts import (
     TruthSettings,
 )
 from experiments.config.settings.point import ModelSettings, Settings, SubjectSettings
+from experiments.config.settings.reality import RealitySettings
 from experiments.config.settings.recorded import RecordedSettings
 from experiments.config.settings.study import RunSettings, StudySettings, SweepSettings
 from experiments.config.settings.system import SystemSettings, system_class
@@ -30,6 +31,7 @@ __all__ = [
     "InferenceSettings",
     "ModelSettings",
     "RankSettings",
+    "RealitySettings",
     "RecordedSettings",
     "Region",
     "RunSettings",

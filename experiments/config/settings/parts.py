@@ -181,6 +181,9 @@ class DemonstrationSettings:
         Literal["euler", "rk4"],
         about("steps of the simulation: `euler`, as the paper's recordings, or `rk4`, Runge-Kutta"),
     ]
+    rule_breaking: Annotated[
+        Share, about("probability that a trial's demonstrator ignores the constraint")
+    ]
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -6,6 +6,7 @@ import math
 from functools import cached_property
 from typing import Annotated
 
+import numpy as np
 from pydantic import BeforeValidator
 from pydantic.dataclasses import dataclass
 
@@ -30,7 +31,9 @@ from experiments.config.settings.parts import (
     TransitionSettings,
     TruthSettings,
 )
+from experiments.config.settings.reality import RealitySettings, read_reality
 from experiments.config.settings.system import SystemSettings, read_system
+from mlci.effort import WithEffort
 from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.systems import System
@@ -95,6 +98,7 @@ class Settings(ModelSettings):
     truth: TruthSettings
     horizon: Annotated[Positive, about("duration of a task", "s")]
     demonstrations: DemonstrationSettings
+    reality: Annotated[RealitySettings, BeforeValidator(read_reality)]
     safety: SafetySettings
     ranks: RankSettings
     calibration: CalibrationSettings
@@ -111,6 +115,17 @@ class Settings(ModelSettings):
             boxes = [self.candidates.box(self.truth.cell)]
         names = [f"truth_{number}" for number in range(len(boxes))]
         return Regions.from_boxes(self.model.space, boxes, names)
+
+    @property
+    def real_system(self) -> SystemSettings:
+        """The system as demonstrators know it: class and arguments."""
+        return self.reality.changed(self.system)
+
+    @cached_property
+    def real_model(self) -> System:
+        """What demonstrators move and what they maximise; `model` is what inference assumes."""
+        system, effort = self.real_system.build(), self.reality.effort
+        return system if effort is None else WithEffort(system, np.array(effort))
 
     @property
     def columns(self) -> dict[str, str | int | float]:

@@ -11,7 +11,7 @@ from tiny_point import composed
 
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
-from experiments.point import stages
+from experiments.point import stages, trials
 from experiments.tracking.trees import canonical_json, flatten, plain
 
 BASE = ["grid.shape=[6,5]", "safety.shape=[21,21]"]
@@ -27,6 +27,8 @@ CHANGES = {
     "system.arguments.control_limit": ("system.control_limit=1.5", ALL),
     "system.arguments.gravity": ("system.gravity=2.0", ALL),
     "system.arguments.length": ("system.length=2.0", ALL),
+    "system.arguments.drag": ("system.drag=0.1", ALL),
+    "system.arguments.mass": ("system.mass=2.0", ALL),
     "actions": ("actions=5", MODEL),
     "hypotheses.shape": ("hypotheses.shape=[10,20]", {"mdp"}),
     "hypotheses.boxes": (f"hypotheses.boxes={BOX}", {"mdp"}),
@@ -59,6 +61,13 @@ CHANGES = {
     "demonstrations.clip": ("demonstrations.clip=true", DEMONSTRATOR),
     "demonstrations.integrator": ("demonstrations.integrator=rk4", DEMONSTRATOR),
     "demonstrations.wind": ("demonstrations.wind=false", DEMONSTRATOR),
+    "demonstrations.rule_breaking": ("demonstrations.rule_breaking=0.1", DEMONSTRATOR),
+    "reality.system": ("reality.system={length: 2.0}", {"safe_set", "demonstrations"}),
+    "reality.effort": ("reality.effort=[0.0,1.0,0.0]", DEMONSTRATOR),
+    "reality.iterations": ("reality.iterations=2", DEMONSTRATOR),
+    "reality.integrator": ("reality.integrator=rk4", DEMONSTRATOR),
+    "reality.control_noise": ("reality.control_noise=[0.1]", DEMONSTRATOR),
+    "reality.sensor_noise": ("reality.sensor_noise=[0.1,0.1]", DEMONSTRATOR),
     "safety.method": ("safety.method=escapes", {"safe_set", "demonstrations"}),
     "safety.shape": ("safety.shape=[23,21]", {"safe_set", "demonstrations"}),
     "safety.margin": ("safety.margin=0.1", DEMONSTRATOR),
@@ -82,7 +91,7 @@ def keys(settings: Settings) -> dict[str, bytes]:
     safe_set = canonical_json(stages.safe_set_inputs(settings))
     return {
         "safe_set": safe_set,
-        "demonstrations": canonical_json(stages.demonstration_inputs(settings, safe_set.hex())),
+        "demonstrations": canonical_json(trials.demonstration_inputs(settings, safe_set.hex())),
         "mdp": canonical_json(stages.model_inputs(settings, settings.candidates)),
         "mdp_truth": canonical_json(stages.model_inputs(settings, settings.constraint)),
     }
@@ -106,7 +115,10 @@ def test_a_change_makes_anew_what_depends_on_it(field: str) -> None:
     several = [words] if "{" in words or "[" in words else words.split()
     base, changed = settings_of(), settings_of(*several)
     flat, other = (flatten(plain(each)) for each in (base, changed))
-    assert flat[field] != other[field]
+    of_field, of_other = (
+        {k: v for k, v in tree.items() if k.startswith(field)} for tree in (flat, other)
+    )
+    assert of_field != of_other
     before, after = keys(base), keys(changed)
     assert {stage for stage in ALL if before[stage] != after[stage]} == stages_made_anew
 
@@ -119,5 +131,5 @@ def test_horizon_counts_for_a_safe_set_from_constant_controls() -> None:
 def test_nothing_forbidden_still_depends_on_the_system() -> None:
     """Where there is no safe set, whose key would tell."""
     one, other = (settings_of("truth=none", f"system.length={length}") for length in (1.0, 2.0))
-    inputs = [stages.demonstration_inputs(each, None) for each in (one, other)]
+    inputs = [trials.demonstration_inputs(each, None) for each in (one, other)]
     assert canonical_json(inputs[0]) != canonical_json(inputs[1])

@@ -13,7 +13,7 @@ from experiments.app import version_base
 from experiments.config.paths import CONF
 from experiments.config.read import plain_tree, read_config
 from experiments.config.settings import Settings
-from experiments.point import stages
+from experiments.point import stages, trials
 from experiments.point.run import run_point
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.store import Store
@@ -110,29 +110,29 @@ def test_choices_reach_the_demonstrator(tmp_path: Path) -> None:
     store = Store(tmp_path)
     words = ["safety.shape=[41,41]", "demonstrations.pairs=16", "demonstrations.keep=16"]
     words += ["demonstrations.dt=0.02", "demonstrations.restarts=1", "horizon=4.0"]
-    plain = stages.demonstrations(composed(*words), store)
+    plain = trials.demonstrations(composed(*words), store)
     kept = plain.kept(16)
     turned = np.abs(plain.states[kept, -1, 0] - plain.states[kept, 0, 0])
     assert np.max(np.abs(plain.controls[kept])) > 2.5
     assert np.max(turned) > np.pi + 0.1
-    clipped = stages.demonstrations(composed(*words, "demonstrations.clip=true"), store)
+    clipped = trials.demonstrations(composed(*words, "demonstrations.clip=true"), store)
     assert np.max(np.abs(clipped.controls)) <= 2.0
-    direct = stages.demonstrations(composed(*words, "demonstrations.wind=false"), store)
+    direct = trials.demonstrations(composed(*words, "demonstrations.wind=false"), store)
     turned = np.abs(direct.states[:, -1, 0] - direct.states[:, 0, 0])[direct.kept(16)]
     assert np.max(turned) < np.pi + 0.05
-    smooth = stages.demonstrations(composed(*words, "demonstrations.integrator=rk4"), store)
-    for trials, integrator in ((plain, EULER), (smooth, RK4)):
+    smooth = trials.demonstrations(composed(*words, "demonstrations.integrator=rk4"), store)
+    for each, integrator in ((plain, EULER), (smooth, RK4)):
         step = integrator.step
-        paths = rollout(Pendulum(), trials.starts, trials.controls, 0.02, step=step)
-        np.testing.assert_allclose(trials.states, paths, atol=1e-10)
+        paths = rollout(Pendulum(), each.starts, each.controls, 0.02, step=step)
+        np.testing.assert_allclose(each.states, paths, atol=1e-10)
     safe, _ = stages.safe_set(composed(*words), store)
     margin = border_margin(Pendulum(), safe, 0.02)
-    for trials, integrator in ((plain, EULER), (smooth, RK4)):
+    for each, integrator in ((plain, EULER), (smooth, RK4)):
         # What a filter has let through once passes again, if it looks ahead by the same steps.
         once = SafetyFilter(Pendulum(), safe, 0.02, margin, integrator=integrator)
-        again = once.apply(trials.states[:, :-1], trials.controls)
-        np.testing.assert_array_equal(again, trials.controls)
-    careful = stages.demonstrations(composed(*words, "safety.margin=0.6"), store)
+        again = once.apply(each.states[:, :-1], each.controls)
+        np.testing.assert_array_equal(again, each.controls)
+    careful = trials.demonstrations(composed(*words, "safety.margin=0.6"), store)
     assert np.min(safe.value(careful.starts)) >= 0.6
     assert np.min(safe.value(plain.starts)) < 0.6
 
