@@ -27,9 +27,11 @@ V       values                safe set's value function                  unit of
 ======  ====================  =========================================  ==============
 """
 
+from mlci.calibration import Calibration, calibrate
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.diagnosis import Diagnosis, diagnose
+from mlci.forecasts import ForecastMap
 from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
@@ -52,9 +54,11 @@ from mlci.tabular import TabularModel, action_grid, discretize
 
 __all__ = [
     "Box",
+    "Calibration",
     "Demonstration",
     "Diagnosis",
     "DoubleIntegrator",
+    "ForecastMap",
     "FunctionSystem",
     "Grid",
     "Inference",
@@ -70,6 +74,7 @@ __all__ = [
     "TelescopingPendulum",
     "TrajectoryDistribution",
     "action_grid",
+    "calibrate",
     "check_affine",
     "check_system",
     "demonstrate",

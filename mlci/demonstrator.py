@@ -96,9 +96,6 @@ def sample_trials(
 ) -> list[Trial]:
     """Draw tasks, uniformly among safe starts and goals, and first guesses for them.
 
-    A guess holds each control for `hold`, uniform in the control box: noise that changed with
-    every sample would average out, and all restarts would follow the same path.
-
     Args:
         safe_set: starts and goals are drawn anew until they lie in it; None allows all.
         start_box: finite box of starts and goals.
@@ -119,7 +116,7 @@ def sample_trials(
         ValueError: a horizon that dt does not divide, or a start box with no safe state.
     """
     steps = step_count(horizon, dt)
-    n, m = system.space.dimension, system.control_box.dimension
+    n = system.space.dimension
     if start_box.dimension != n or not np.all(np.isfinite(start_box.widths)):
         raise ValueError(f"a start box needs {n} finite sides: {start_box}")
     offsets = Box.point(np.zeros(n)) if goal_offsets is None else goal_offsets
@@ -129,15 +126,33 @@ def sample_trials(
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
         start = _draw_safe(rng, start_box, safe_set, margin)
         goal = _draw_safe(rng, start_box, safe_set, margin)
-        low, high = system.control_box.lower, system.control_box.upper
-        levels = rng.uniform(low, high, size=(restarts, -(-steps // per_hold), m))
-        guesses = np.repeat(levels, per_hold, axis=1)[:, :steps]
+        guesses = first_guesses(rng, system.control_box, steps, per_hold, restarts)
         task = Task(start, Box(goal + offsets.lower, goal + offsets.upper), horizon)
         noise = None
         if control_noise is not None:
             noise = rng.standard_normal((steps, m)) * np.asarray(control_noise) / np.sqrt(dt)
         drawn.append(Trial(task, guesses, noise))
     return drawn
+
+
+def first_guesses(
+    rng: np.random.Generator, control_box: Box, steps: int, per_hold: int, restarts: int
+) -> Floats:
+    """Random controls (R, K, m), uniform in the control box and held for some steps.
+
+    Noise that changed with every sample would average out, and all restarts would follow the same
+    path.
+
+    Args:
+        rng: the generator.
+        control_box: finite range of the controls.
+        steps: K.
+        per_hold: steps for which a control is held.
+        restarts: R.
+    """
+    size = restarts, -(-steps // per_hold), control_box.dimension
+    levels = rng.uniform(control_box.lower, control_box.upper, size=size)
+    return np.repeat(levels, per_hold, axis=1)[:, :steps]
 
 
 def demonstrate(

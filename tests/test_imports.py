@@ -40,8 +40,11 @@ MLCI = {
     "mlci.recursions": "mlci.end_moves",
     "mlci.maxent": "mlci.recursions mlci.demonstrations",
     "mlci.evidence": "mlci.spaces",
-    "mlci.inference": "mlci.evidence mlci.regions",
+    "mlci.forecasts": "mlci.regions",
+    "mlci.forecast_scores": "mlci.forecasts",
+    "mlci.inference": "mlci.evidence mlci.forecasts",
     "mlci.preparation": "mlci.inference mlci.maxent",
+    "mlci.calibration": "mlci.forecast_scores mlci.demonstrator mlci.preparation",
     "mlci.metrics": "mlci.evidence",
 }
 # What mlci may import of others: no configs, no files' formats but Parquet, no figures.
