@@ -27,7 +27,7 @@ from mlci.spaces import Bools, Box, Floats, StateSpace
 from mlci.tabular import Progress, TabularModel
 
 FEWEST = 20  # demonstrations from which a map can be fitted and judged
-_SAMPLES = 250  # of a simulated path, at least
+_SAMPLES = 100  # of a simulated path, at least; Runge-Kutta steps are exact enough with fewer
 _HOLDS = 10  # controls that a first guess holds
 _ATTEMPTS = 100  # to draw a task inside the state space
 
@@ -90,7 +90,7 @@ def calibrate(
     """Calibrate the forecasts of a model by simulated demonstrations without a constraint.
 
     It is assumed that people move like the demonstrator, who maximises the system's running reward
-    (`mlci.demonstrator.demonstrate`, with Runge-Kutta steps, 250 or a few more a task).
+    (`mlci.demonstrator.demonstrate`, with at least 100 Runge-Kutta steps a task).
 
     Args:
         model: the tabular model.

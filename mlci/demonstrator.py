@@ -130,7 +130,8 @@ def sample_trials(
         task = Task(start, Box(goal + offsets.lower, goal + offsets.upper), horizon)
         noise = None
         if control_noise is not None:
-            noise = rng.standard_normal((steps, m)) * np.asarray(control_noise) / np.sqrt(dt)
+            shape = steps, system.control_box.dimension
+            noise = rng.standard_normal(shape) * np.asarray(control_noise) / np.sqrt(dt)
         drawn.append(Trial(task, guesses, noise))
     return drawn
 
