@@ -72,7 +72,7 @@ def test_simulated_demonstrations_improve_the_forecasts() -> None:
     model = discretize(system, Grid(system.space, (12, 12)), action_grid(system, 5), 0.5, regions)
     ends = np.random.default_rng(0).uniform([0, -2], [6, 2], (8, 2, 2))
     given = [Task(start, Box.point(goal), 5.0) for start, goal in ends]
-    calibration = calibrate(model, given, trials=60, restarts=1, n_jobs=2)
+    calibration = calibrate(model, given, trials=60, restarts=1)
     assert calibration.used > FEWEST
     assert calibration.before is not None
     assert calibration.after is not None
