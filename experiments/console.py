@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import textwrap
+from collections.abc import Container, Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
+from mlci.answers import Answer, listed
 from mlci.diagnosis import Diagnosis
-from mlci.spaces import StateSpace
+from mlci.inference import Inference
+from mlci.spaces import Box, StateSpace
+
+WIDTH = 80  # columns of a terminal
+_AREAS, _CARRIERS = 3, 4  # that are printed
 
 
 def words(name: str) -> str:
@@ -16,10 +22,11 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def trial_line(counts: Mapping[str, int]) -> str:
+def trial_lines(counts: Mapping[str, int]) -> list[str]:
     """How many demonstrations were kept, and why the others were not."""
     rejected = ", ".join(f"{n} {words(kind)}" for kind, n in counts.items() if kind != "kept")
-    return f"demonstrations  {counts['kept']} of {sum(counts.values())} kept ({rejected})"
+    kept = f"{counts['kept']} of {sum(counts.values())} kept"
+    return entry("demonstrations", f"{kept} ({rejected})")
 
 
 def diagnosis_lines(
@@ -29,56 +36,186 @@ def diagnosis_lines(
     frozen = ", ".join(
         f"{words(name)} {share:.0%}" for share, name in zip(diagnosis.frozen, names, strict=True)
     )
-    yield (
-        f"discretisation  {diagnosis.stay:.0%} of moves stay in their cell, {diagnosis.leave:.0%} "
-        f"leave the state space, {diagnosis.cells_crossed:.1f} cells crossed in a step"
+    yield from entry(
+        "discretisation",
+        f"{diagnosis.stay:.0%} of moves stay in their cell, {diagnosis.leave:.0%} leave the state "
+        f"space, {diagnosis.cells_crossed:.1f} cells crossed in a step; cells that no action "
+        f"changes: {frozen}; {unreachable} of {tasks} goals cannot be reached",
     )
-    yield f"                cells that no action changes: {frozen}"
-    yield f"                {unreachable} of {tasks} goals cannot be reached"
     for concern in diagnosis.concerns(names, unreachable, tasks):
-        yield f"       warning  {concern}"
+        yield from entry("warning", concern)
 
 
-def ranking_lines(hypotheses: pd.DataFrame, space: StateSpace, top: int) -> Iterator[str]:
-    """The most likely hypotheses, and how much is left for there being none."""
-    feasible = int(hypotheses["feasible"].sum())
-    yield (
-        f"hypotheses      {feasible} of {len(hypotheses)} feasible; probability that there is no "
-        f"constraint {1 - hypotheses['posterior'].sum():.2g}"
+def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) -> Iterator[str]:
+    """The answer first, then what it assumes, what it rests on, and what is doubtful.
+
+    Args:
+        answer: the answer.
+        top: hypotheses that are printed.
+        truth: numbers of the hypotheses that the truth covers, as far as it is known.
+    """
+    inference, credible = answer.inference, answer.credible
+    names, space = inference.hypotheses.names, inference.hypotheses.space
+    yield from entry("answer", _first_words(answer))
+    yield from _ranking_lines(inference, top, truth)
+    none = "no constraint and " if credible.has_none else ""
+    yield from entry(
+        f"{100 * credible.share:g} % credible",
+        f"{none}{len(credible.regions)} of {len(names)} regions"
+        + (f", in {counted(len(credible.areas), 'area')}:" if credible.areas else ""),
     )
-    yield "          rank  gain [nat]  posterior  region"
-    best = hypotheses[hypotheses["feasible"]].sort_values(["rank", "hypothesis"]).head(top)
-    for _, row in best.iterrows():
-        sides = [
-            f"{words(name)} {row[f'lower_{name}']:.4g} to {row[f'upper_{name}']:.4g} {unit}"
-            for name, unit in zip(space.names, space.units, strict=True)
-            if np.isfinite(row[f"lower_{name}"])
-        ]
-        true = "  (truth)" if row.get("covered_by_truth", False) else ""
-        yield (
-            f"          {row['rank']:4g}  {row['gain']:10.3f}  {row['posterior']:9.2g}  "
-            f"{', '.join(sides)}{true}"
+    for area in credible.areas[:_AREAS]:
+        members = listed([names[i] for i in area.regions])
+        yield from entry(
+            "", f"{probability(area.probability)} in {members}: {bounds(area.hull, space)}", hang=2
         )
+    if len(credible.areas) > _AREAS:
+        yield from entry("", f"and {counted(len(credible.areas) - _AREAS, 'more area')}")
+    yield from entry("assumed", "; ".join(answer.assumptions))
+    yield from entry("rests on", _carrier_words(answer))
+    yield from entry("", _left_out_words(answer))
+    for warning in answer.warnings:
+        yield from entry("warning", warning)
+
+
+def _first_words(answer: Answer) -> str:
+    """Which region comes first, and how it compares with there being none."""
+    inference, first = answer.inference, answer.support.region
+    name, none = inference.hypotheses.names[first], probability(inference.posterior_none)
+    chance = probability(inference.posterior[first])
+    if not inference.gain[first] > 0:
+        return f"no region is more likely than none, whose probability is {none}"
+    return f"region {name} is the most likely, with probability {chance}; no constraint {none}"
+
+
+def _ranking_lines(inference: Inference, top: int, truth: Container[int]) -> Iterator[str]:
+    """The first hypotheses, in columns, or with their bounds below them if these are too many."""
+    hypotheses, space = inference.hypotheses, inference.hypotheses.space
+    first = [i for i in inference.order[:top].tolist() if inference.gain[i] > -np.inf]
+    bounded = np.flatnonzero(np.any(np.isfinite(hypotheses.lower), axis=0)).tolist()
+    gains = [gain_words(inference.gain[i]) for i in first]
+    width = max(map(len, ["gain", *gains]))
+    facts = [["region", "gain".rjust(width), "posterior"], ["", "[nat]".rjust(width), ""]]
+    for i, gain in zip(first, gains, strict=True):
+        chance = probability(inference.posterior[i]).rjust(9)
+        facts.append([hypotheses.names[i], gain.rjust(width), chance])
+    sides = [[words(space.names[d]) for d in bounded], [f"[{space.units[d]}]" for d in bounded]]
+    sides += [[_side(hypotheses.box(i), d) for d in bounded] for i in first]
+    marks = [[""], [""], *(["(truth)" if i in truth else ""] for i in first)]
+    lines = list(
+        table_lines(
+            [[*fact, *side, *mark] for fact, side, mark in zip(facts, sides, marks, strict=True)]
+        )
+    )
+    if max(map(len, lines)) + 2 <= WIDTH:
+        yield from (f"  {line}" for line in lines)
+        return
+    few = [fact + mark for fact, mark in zip(facts, marks, strict=True)]
+    for i, line in zip([None, None, *first], table_lines(few), strict=True):
+        yield f"  {line}"
+        if i is not None:
+            yield from entry("", bounds(hypotheses.box(i), space))
+
+
+def _carrier_words(answer: Answer) -> str:
+    """Which demonstrations carry the first region's gain."""
+    support, inference = answer.support, answer.inference
+    name, carriers = inference.hypotheses.names[support.region], support.carriers()
+    if not len(carriers):
+        return f"nothing: no demonstration speaks for {name}"
+    shares = [f"{inference.names[j]} {support.share[j]:.0%}".replace("%", " %") for j in carriers]
+    return (
+        f"{len(carriers)} of {len(support.share)} demonstrations, which bring half of the gain of "
+        f"{name}: {listed(shares, _CARRIERS)}"
+    )
+
+
+def _left_out_words(answer: Answer) -> str:
+    """Which region comes first when each demonstration is left out."""
+    support, inference = answer.support, answer.inference
+    name = inference.hypotheses.names[support.region]
+    if len(support.stays) < 2:
+        return "one demonstration alone, which cannot be left out"
+    if support.stays.all():
+        return f"{name} stays first whichever demonstration is left out"
+    others = [
+        f"{inference.hypotheses.names[support.first_without[j]]} without {inference.names[j]}"
+        for j in np.flatnonzero(~support.stays)
+    ]
+    return (
+        f"{name} stays first when any but {len(others)} of {len(support.stays)} demonstrations is "
+        f"left out; first are {listed(others, _CARRIERS)}"
+    )
+
+
+def probability(value: float) -> str:
+    """A probability, never rounded to 0 or 1."""
+    if value in (0, 1):
+        return f"{value:g}"
+    if value < 0.0005:
+        return "<0.001"
+    return ">0.999" if value >= 0.9995 else f"{value:.3f}"
+
+
+def gain_words(gain: float) -> str:
+    """A gain; a word where it is infinite."""
+    return "unavoidable" if gain == np.inf else f"{gain:.3f}"
+
+
+def bounds(box: Box, space: StateSpace) -> str:
+    """Where a box is, in words."""
+    sides = [
+        f"{words(name)} {_side(box, d)} {unit}".rstrip()
+        for d, (name, unit) in enumerate(zip(space.names, space.units, strict=True))
+        if np.isfinite(box.lower[d])
+    ]
+    return ", ".join(sides) or "everywhere"
+
+
+def _side(box: Box, d: int) -> str:
+    """The ends of a box in a dimension."""
+    if not np.isfinite(box.lower[d]):
+        return "any"
+    return f"{box.lower[d]:.4g} to {box.upper[d]:.4g}"
+
+
+def counted(count: int, noun: str) -> str:
+    """A count with its noun."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def entry(title: str, text: str, hang: int = 0) -> list[str]:
+    """A text beside its title, in lines that break between words."""
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=f"{title:16}",
+        subsequent_indent=" " * (16 + hang),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def measure_lines(summary: pd.Series, ranks: pd.DataFrame, top: int) -> Iterator[str]:
     """The study's three measures."""
-    yield (
-        f"measures        final-state error {summary['final_state_error']:.3f}; violation distance "
+    yield from entry(
+        "measures",
+        f"final-state error {summary['final_state_error']:.3f}; violation distance "
         f"{summary['violation_distance']:.2f} each (floor {summary['violation_floor']:.2f}), "
-        f"{summary['violation_distance_pooled']:.2f} pooled"
+        f"{summary['violation_distance_pooled']:.2f} pooled",
     )
     if ranks["rank"].isna().all():
-        yield "                nothing is forbidden, so there is no truth to rank"
+        yield from entry("", "nothing is forbidden, so there is no truth to rank")
         return
     sizes = ranks["demonstrations"]
     for size in sorted({1, 5, 9, sizes.max()}.intersection(sizes)):
         rows = ranks[sizes == size]
         low, median, high = rows["rank"].quantile([0.1, 0.5, 0.9])
-        yield (
-            f"                rank of the truth after {size}: median {median:g} (80 % between "
-            f"{low:g} and {high:g}), top {top} in {rows[f'share_top_{top}'].mean():.0%} of random "
-            "subsets"
+        yield from entry(
+            "",
+            f"rank of the truth after {size}: median {median:g} (80 % between {low:g} and "
+            f"{high:g}), top {top} in {rows[f'share_top_{top}'].mean():.0%} of random subsets",
+            hang=2,
         )
 
 

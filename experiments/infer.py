@@ -12,6 +12,7 @@ if __name__ == "__main__":  # before all that takes time to import
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,12 +22,13 @@ from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, read_recorded_config
 from experiments.config.settings import RecordedSettings
-from experiments.console import diagnosis_lines, ranking_lines
+from experiments.console import answer_lines, diagnosis_lines, entry
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.truth_tables import dimension_table
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.trees import canonical_json, plain
+from mlci.answers import Answer, answer
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
 from mlci.inference import Inference
@@ -66,15 +68,22 @@ def infer(settings: RecordedSettings) -> int:
         round_horizon=settings.round_horizon,
     )
     ranking = ranking_table(inference)
+    result = answer(
+        model,
+        demonstrations,
+        inference,
+        round_horizon=settings.round_horizon,
+        exact_ends=settings.inference.exact_ends,
+    )
+    for line in answer_lines(result, settings.top):
+        print(line)
     print(f"demonstrations  {len(demonstrations)} used, {len(problems)} files not used")
     for line in _refutation_lines(inference):
         print(line)
     unreachable = int(np.sum(~inference.reachable))
     for line in diagnosis_lines(diagnose(model), space.names, unreachable, len(demonstrations)):
         print(line)
-    for line in ranking_lines(ranking, space, settings.top):
-        print(line)
-    folder = _save(settings, demonstrations, problems, inference, ranking)
+    folder = _save(settings, demonstrations, problems, result, ranking)
     print(f"written: {folder}")
     return FAILED if problems else DONE
 
@@ -121,14 +130,13 @@ def _tabular_model(settings: RecordedSettings) -> TabularModel:
 def _refutation_lines(inference: Inference) -> list[str]:
     """Which hypotheses each demonstration refutes, by their numbers; * where it alone does."""
     alone = np.sum(inference.violated, axis=0) == 1
-    lines = ["      hypotheses that each refutes (* no other does):"]
-    width = max(map(len, inference.names))
+    lines = entry("", "hypotheses that each refutes (* no other does):")
     for name, violated, reachable in zip(
         inference.names, inference.violated, inference.reachable, strict=True
     ):
         numbers = [f"{i}{'*' if alone[i] else ''}" for i in np.flatnonzero(violated)]
-        note = "" if reachable else "  (goal unreachable: adds no gain)"
-        lines.append(f"      {name:{width}}  {' '.join(numbers)}{note}")
+        note = [] if reachable else ["(goal unreachable: adds no gain)"]
+        lines += entry("", " ".join([name, *numbers, *note]), hang=2)
     return lines
 
 
@@ -136,7 +144,7 @@ def _save(
     settings: RecordedSettings,
     demonstrations: Sequence[Demonstration],
     problems: Sequence[Problem],
-    inference: Inference,
+    result: Answer,
     ranking: pd.DataFrame,
 ) -> Path:
     """Write tables, map and record into a folder of their own, named by what went in."""
@@ -149,18 +157,24 @@ def _save(
     }
     results = results_folder(settings) / "inference"
     folder = results / digest(canonical_json(made_from))[:16]
-    tables = {"hypotheses": ranking, **_demonstration_tables(demonstrations, inference)}
+    tables = {"hypotheses": ranking, **_demonstration_tables(demonstrations, result.inference)}
     for name, table in tables.items():
         replace_file(folder / f"{name}.csv", csv_bytes(table))
     save(hypothesis_map.draw(ranking, paths, dimension_table(space)), folder / "map")
+    replace_file(folder / "answer.json", _json_bytes(result.record()))
     record = {
         **made_from,
         "demonstrations": settings.demonstrations,
         "not_used": [str(problem) for problem in problems],
         **environment(results_folder(settings)),
     }
-    replace_file(folder / "record.json", json.dumps(record, indent=1).encode() + b"\n")
+    replace_file(folder / "record.json", _json_bytes(record))
     return folder
+
+
+def _json_bytes(tree: dict[str, Any]) -> bytes:
+    """A tree as it is written to a file."""
+    return json.dumps(tree, indent=1, allow_nan=False).encode() + b"\n"
 
 
 def _path_table(demonstrations: Sequence[Demonstration], names: Sequence[str]) -> pd.DataFrame:

@@ -45,6 +45,10 @@ MLCI = {
     "mlci.inference": "mlci.evidence mlci.forecasts",
     "mlci.preparation": "mlci.inference mlci.maxent",
     "mlci.calibration": "mlci.forecast_scores mlci.demonstrator mlci.preparation",
+    "mlci.credible_sets": "mlci.regions",
+    "mlci.support": "mlci.inference",
+    "mlci.misfit": "mlci.maxent",
+    "mlci.answers": "mlci.credible_sets mlci.misfit mlci.support",
     "mlci.metrics": "mlci.evidence",
 }
 # What mlci may import of others: no configs, no files' formats but Parquet, no figures.

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
-from experiments.console import diagnosis_lines, measure_lines, ranking_lines, trial_line
+from experiments.console import answer_lines, diagnosis_lines, measure_lines, trial_lines
 from experiments.point.inference import infer_point
 from experiments.point.measures import measure_point
 from experiments.point.tables import point_tables
 from experiments.tracking.store import Store
+from mlci.answers import answer
 
 
 def run_point(
@@ -28,16 +30,25 @@ def run_point(
         Tables by name, see `experiments.point.tables.point_tables`.
     """
     inferred = infer_point(settings, store)
-    space, top = settings.model.space, settings.ranks.top
-    log(trial_line(inferred.trials.counts()))
+    inference, space, top = inferred.inference, settings.model.space, settings.ranks.top
+    result = answer(
+        inferred.model,
+        inferred.demonstrations,
+        inference,
+        hypotheses=inferred.hypotheses,
+        exact_ends=settings.inference.exact_ends,
+    )
+    covered = np.flatnonzero(inference.hypotheses.inside(settings.constraint)).tolist()
+    for line in answer_lines(result, top, covered):
+        log(line)
+    for line in trial_lines(inferred.trials.counts()):
+        log(line)
     for line in diagnosis_lines(
         inferred.diagnosis, space.names, inferred.unreachable, len(inferred.numbers)
     ):
         log(line)
     measures = measure_point(settings, inferred)
     tables = point_tables(settings, inferred, measures)
-    for line in ranking_lines(tables["hypotheses"], space, top):
-        log(line)
     for line in measure_lines(tables["summary"].iloc[0], tables["ranks"], top):
         log(line)
     return tables

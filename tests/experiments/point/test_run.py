@@ -82,13 +82,25 @@ def test_paths_and_their_times_are_every_fifth_sample(point: tuple) -> None:
     np.testing.assert_allclose(times, np.arange(17) * 5 * 0.05)
 
 
-def test_lines_tell_counts_diagnosis_ranking_and_measures_in_turn(point: tuple) -> None:
+def test_lines_tell_the_answer_first_then_counts_diagnosis_and_measures(point: tuple) -> None:
     _, tables, lines = point
     (row,) = tables["summary"].to_dict("records")
     heads = [line.split("  ")[0] for line in lines if not line.startswith(" ")]
-    assert heads == ["demonstrations", "discretisation", "hypotheses", "measures"]
-    assert f"{row['kept']} of 14 kept" in lines[0]
-    assert f"final-state error {row['final_state_error']:.3f}" in "\n".join(lines)
+    once = [head for head in heads if head != "warning"]
+    assert once == [
+        "answer", "95 % credible", "assumed", "rests on",
+        "demonstrations", "discretisation", "measures",
+    ]  # fmt: skip
+    best = tables["hypotheses"].sort_values(["rank", "hypothesis"]).iloc[0]
+    assert lines[0].startswith(
+        f"answer          region {best['hypothesis']:.0f} is the most likely"
+    )
+    text = " ".join(" ".join(lines).split())
+    assert f"{row['kept']} of 14 kept" in text
+    assert f"final-state error {row['final_state_error']:.3f}" in text
+    covered = int(tables["hypotheses"]["covered_by_truth"].sum())
+    assert text.count("(truth)") <= covered
+    assert max(map(len, lines)) <= 80
 
 
 def test_rows_are_opened_by_the_point_and_numbers_are_exact(point: tuple, tmp_path: Path) -> None:

@@ -1,0 +1,202 @@
+"""What a person should be told of an inference: the credible set, what it rests on, and doubts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mlci.credible_sets import CredibleSet, credible_set
+from mlci.demonstrations import Demonstration
+from mlci.grids import Grid
+from mlci.inference import Inference
+from mlci.maxent import TrajectoryDistribution
+from mlci.misfit import Misfit, misfit
+from mlci.regions import Regions
+from mlci.spaces import Bools, Ints
+from mlci.support import Support, support
+from mlci.tabular import TabularModel
+
+# Demonstrations without a constraint would enter such a region in less than one set of this size
+# in 20, so that avoiding it says nothing.
+_RARELY_ENTERED = 0.05
+_SAME_SIDE = 1e-6  # of a cell
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """An inference, and how to read it.
+
+    Attributes:
+        inference: from N demonstrations about C hypotheses.
+        credible: the 95 % credible set.
+        support: what the first region's gain rests on.
+        misfit: how the demonstrations compare with the model's own trajectories.
+        unseen: numbers of the regions that none of the tasks could have shown.
+        cut: (C, n) whether a hypothesis has a side in a dimension that is no border of cells.
+        temperature: of the tabular model.
+        exact_ends: whether its trajectories begin and end at states, not at cells.
+    """
+
+    inference: Inference
+    credible: CredibleSet
+    support: Support
+    misfit: Misfit
+    unseen: Ints
+    cut: Bools
+    temperature: float
+    exact_ends: bool
+
+    @property
+    def assumptions(self) -> list[str]:
+        """What the answer takes for granted, a phrase each."""
+        inference = self.inference
+        return [
+            "at most one region is forbidden",
+            f"prior of none {inference.prior_none:g}, the rest shared equally",
+            f"model error {inference.rates.model_error:g}",
+            f"rule breaking {inference.rates.rule_breaking:g}",
+            f"temperature {self.temperature:g}",
+            f"paths begin and end at {'states' if self.exact_ends else 'cells'}",
+        ]
+
+    def record(self) -> dict[str, Any]:
+        """The answer for programs, fit for JSON: infinite and missing numbers are None."""
+        inference, names = self.inference, self.inference.hypotheses.names
+        space, first = inference.hypotheses.space, self.support.region
+        return {
+            "first": {
+                "region": names[first],
+                "gain": _finite(inference.gain[first]),
+                "posterior": float(inference.posterior[first]),
+            },
+            "posterior_none": inference.posterior_none,
+            "credible_set": {
+                "share": self.credible.share,
+                "probability": self.credible.probability,
+                "no_constraint": self.credible.has_none,
+                "regions": [names[i] for i in self.credible.regions],
+                "areas": [
+                    {
+                        "regions": [names[i] for i in area.regions],
+                        "probability": area.probability,
+                        "lower": dict(zip(space.names, map(_finite, area.hull.lower), strict=True)),
+                        "upper": dict(zip(space.names, map(_finite, area.hull.upper), strict=True)),
+                    }
+                    for area in self.credible.areas
+                ],
+            },
+            "assumptions": self.assumptions,
+            "demonstrations": [
+                {
+                    "name": name,
+                    "share_of_gain": float(self.support.share[j]),
+                    "first_without": names[self.support.first_without[j]],
+                    "regions": int(self.misfit.count[j]),
+                    "regions_p": _finite(self.misfit.count_p[j]),
+                    "distance": float(self.misfit.distance[j]),
+                    "distance_p": _finite(self.misfit.distance_p[j]),
+                }
+                for j, name in enumerate(inference.names)
+            ],
+            "unseen": [names[i] for i in self.unseen],
+            "warnings": self.warnings,
+        }
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader should know before believing the answer, those of the inference first."""
+        phrases, names = list(self.inference.warnings), np.array(self.inference.names, dtype=object)
+        if rare := names[self.misfit.is_rare].tolist():
+            phrases.append(
+                f"the tabular model finds {len(rare)} of {len(names)} demonstrations nearly "
+                f"impossible (p < 0.01; by chance 1 in 50): {listed(rare)}"
+            )
+        if len(self.unseen):
+            phrases.append(
+                f"none of the tasks could have shown {len(self.unseen)} of {len(self.cut)} "
+                "regions, which hardly any path enters: that they are avoided says nothing"
+            )
+        if np.any(self.cut):
+            space = self.inference.hypotheses.space
+            sides = " and ".join(
+                space.names[d].replace("_", " ") for d in np.flatnonzero(np.any(self.cut, axis=0))
+            )
+            phrases.append(
+                f"the grid cuts {int(np.sum(np.any(self.cut, axis=1)))} of {len(self.cut)} "
+                f"regions: their borders in {sides} are no borders of cells"
+            )
+        return phrases
+
+
+def answer(
+    model: TabularModel,
+    demonstrations: Sequence[Demonstration],
+    inference: Inference,
+    *,
+    hypotheses: Bools | None = None,
+    round_horizon: bool = False,
+    exact_ends: bool = True,
+) -> Answer:
+    """Look at an inference from all sides.
+
+    Args:
+        model: the tabular model.
+        demonstrations: the N that the inference is from.
+        inference: what `infer` made of them, with the arguments below.
+        hypotheses: (C',) mask over the model's regions; None takes all.
+        round_horizon: as of `infer`.
+        exact_ends: as of `infer`.
+    """
+    distributions = (
+        TrajectoryDistribution.of_task(
+            model, each.task, round_horizon=round_horizon, exact_ends=exact_ends
+        )
+        for each in demonstrations
+    )
+    return Answer(
+        inference=inference,
+        credible=credible_set(inference.hypotheses, inference.posterior, inference.posterior_none),
+        support=support(inference),
+        misfit=misfit(distributions, inference.phi, inference.violated, hypotheses=hypotheses),
+        unseen=unseen(inference),
+        cut=cut_by(model.grid, inference.hypotheses),
+        temperature=model.temperature,
+        exact_ends=exact_ends,
+    )
+
+
+def unseen(inference: Inference) -> Ints:
+    """Numbers of the regions that no demonstration violates and that none was likely to.
+
+    Without a constraint, N such demonstrations would be expected to enter them less than 0.05
+    times.
+    """
+    expected = np.sum(inference.phi[inference.reachable], axis=0)
+    return np.flatnonzero((expected < _RARELY_ENTERED) & ~np.any(inference.violated, axis=0))
+
+
+def cut_by(grid: Grid, regions: Regions) -> Bools:
+    """(C, n) whether a region has a side, within the bounds, that is no border of cells."""
+    cut = np.zeros((len(regions), regions.space.dimension), dtype=bool)
+    origin, bounds = grid.corners[0][0], regions.space.bounds
+    for side in (regions.lower, regions.upper):
+        inside = np.isfinite(side) & (
+            regions.space.periodic | ((side > bounds.lower) & (side < bounds.upper))
+        )
+        cells = np.where(inside, (side - origin) / grid.widths, 0.0)
+        cut |= np.abs(cells - np.round(cells)) > _SAME_SIDE
+    return cut
+
+
+def _finite(number: float) -> float | None:
+    """A number for JSON."""
+    return float(number) if np.isfinite(number) else None
+
+
+def listed(names: Sequence[str], most: int = 8) -> str:
+    """The first names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

@@ -1,0 +1,138 @@
+"""What is printed: the answer first, in lines of 80 columns that break between words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from experiments.console import answer_lines, bounds, entry, probability
+from mlci.answers import Answer
+from mlci.credible_sets import credible_set
+from mlci.evidence import PAPER, Rates
+from mlci.inference import Inference
+from mlci.misfit import Misfit
+from mlci.regions import Regions
+from mlci.spaces import Box, StateSpace
+from mlci.support import support
+
+PLANE = StateSpace(
+    Box([0.0, -6.0], [6.0, 6.0]), [True, False], ("angle", "angular_velocity"), ("rad", "rad/s")
+)
+NAMES = ("angle", "angular_velocity", "length", "length_velocity")
+BODY = StateSpace(
+    Box([-1.2345] * 4, [1.2345] * 4), [False] * 4, NAMES, ("rad", "rad/s", "dm", "dm/s")
+)
+
+
+def answer(
+    space: StateSpace,
+    shape: Sequence[int | None],
+    alpha: Sequence[Sequence[float]],
+    violated: Sequence[int] = (),
+    rates: Rates = PAPER,
+) -> Answer:
+    """An answer from probabilities of avoiding; the first demonstration violates some regions."""
+    hypotheses, avoidance = (
+        Regions.from_grid(space, shape),
+        np.ones((len(alpha), np.prod([k or 1 for k in shape]))),
+    )
+    avoidance[:, : len(alpha[0])] = alpha
+    refuted = np.zeros(avoidance.shape, dtype=bool)
+    refuted[0, list(violated)] = True
+    names = tuple(f"demonstration_of_the_{j}th_person" for j in range(len(alpha)))
+    inference = Inference(
+        hypotheses, names, avoidance, refuted, np.ones(len(alpha), bool), rates=rates
+    )
+    count = len(alpha)
+    return Answer(
+        inference,
+        credible_set(hypotheses, inference.posterior, inference.posterior_none),
+        support(inference),
+        Misfit(np.zeros(count, int), np.zeros(count), np.ones(count), np.ones(count)),
+        np.arange(0),
+        np.zeros((len(hypotheses), space.dimension), bool),
+        1.0,
+        True,
+    )
+
+
+def test_the_answer_word_by_word() -> None:
+    each = answer(PLANE, (6, 2), [[0.02, 0.5, 0.02], [0.02, 1, 0.5], [0.5, 1, 0.9]], [5])
+    assert list(answer_lines(each, 3, [2])) == [
+        "answer          region 0 is the most likely, with probability 0.974; no",
+        "                constraint 0.002",
+        "  region   gain  posterior  angle   angular velocity",
+        "          [nat]             [rad]   [rad/s]",
+        "  0       8.517      0.974  0 to 1  -6 to 0",
+        "  2       4.711      0.022  1 to 2  -6 to 0           (truth)",
+        "  1       0.693     <0.001  0 to 1  0 to 6",
+        "95 % credible   1 of 12 regions, in 1 area:",
+        "                0.974 in 0: angle 0 to 1 rad, angular velocity -6 to 0 rad/s",
+        "assumed         at most one region is forbidden; prior of none 0.5, the rest",
+        "                shared equally; model error 0; rule breaking 0; temperature 1;",
+        "                paths begin and end at states",
+        "rests on        2 of 3 demonstrations, which bring half of the gain of 0:",
+        "                demonstration_of_the_0th_person 46 %,",
+        "                demonstration_of_the_1th_person 46 %",
+        "                0 stays first whichever demonstration is left out",
+    ]
+
+
+def test_what_is_printed_where_there_is_little_to_say() -> None:
+    """No gain at all; one demonstration; another region without it; many areas."""
+    text = said(answer(PLANE, (6, 2), [[1.0]]))
+    assert "no region is more likely than none, whose probability is 0.5" in text
+    assert "rests on nothing: no demonstration speaks for 0" in text
+    assert "one demonstration alone, which cannot be left out" in text
+    assert "95 % credible no constraint and 11 of 12 regions, in 1 area:" in text
+    text = said(answer(PLANE, (6, 2), [[0.01, 1.0], [1.0, 0.1]]))
+    assert (
+        "0 stays first when any but 1 of 2 demonstrations is left out; first are 1 without "
+        "demonstration_of_the_0th_person"
+    ) in text
+    apart = np.where(np.isin(np.arange(25), [0, 2, 10, 12, 20]), 1e-4, 1.0).tolist()
+    text = said(answer(BODY, (None, 5, 5, None), [apart]))
+    assert "in 5 areas:" in text
+    assert "and 2 more areas" in text
+
+
+def said(each: Answer) -> str:
+    """All that is printed, with single spaces."""
+    return " ".join(" ".join(answer_lines(each, 5)).split())
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (0.0, "0"), (1.0, "1"), (1e-9, "<0.001"), (0.00049, "<0.001"), (0.0005, "0.001"),
+        (0.5, "0.500"), (0.99949, "0.999"), (0.9996, ">0.999"),
+    ],
+)  # fmt: skip
+def test_a_probability_is_not_rounded_to_certainty(value: float, words: str) -> None:
+    assert probability(value) == words
+
+
+def test_a_box_in_words() -> None:
+    assert bounds(Box([1.0, -np.inf], [2.5, np.inf]), PLANE) == "angle 1 to 2.5 rad"
+    assert bounds(Box([-np.inf] * 2, [np.inf] * 2), PLANE) == "everywhere"
+
+
+def test_an_entry_keeps_words_whole() -> None:
+    lines = entry("title", f"{'long-word ' * 9}{'x' * 90}", hang=2)
+    assert lines[0].startswith("title           long-word")
+    assert lines[1].startswith(" " * 18 + "long-word")
+    assert lines[-1] == " " * 18 + "x" * 90
+
+
+def test_nothing_is_wider_than_the_terminal_or_broken_inside_a_word() -> None:
+    """With columns for two dimensions, and with bounds below each region for four."""
+    for space, shape in ((PLANE, (6, 2)), (BODY, (3, 3, 3, 3))):
+        each = answer(space, shape, [[0.0, 0.5, 0.02], [0.2, 1, 0.5], [0.5, 1, 0.9]], [5])
+        lines = list(answer_lines(each, 5, [0]))
+        assert max(map(len, lines)) <= 80
+        text = " ".join(" ".join(lines).split())
+        for word in (*each.inference.names[:1], "unavoidable", "(truth)", "angular velocity"):
+            assert word in text
+        assert not [line for line in lines if line != line.rstrip()]

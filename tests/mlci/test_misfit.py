@@ -1,0 +1,127 @@
+"""Misfit, against every trajectory of small models, and against exact probabilities."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from toy_models import toy_model
+
+from mlci.demonstrations import Task
+from mlci.grids import Grid
+from mlci.maxent import TrajectoryDistribution
+from mlci.misfit import misfit, sample_crossings
+from mlci.regions import Regions
+from mlci.spaces import Bools, Box, Floats
+from mlci.systems import DoubleIntegrator
+from mlci.tabular import TabularModel, action_grid, discretize
+
+STEPS = 5
+
+
+def toy_world() -> TabularModel:
+    """Six cells, three moves of each, four regions that a move crosses rarely."""
+    rng = np.random.default_rng(7)
+    successor = rng.integers(0, 6, size=(6, 3))
+    crosses = rng.random((18, 4)) < [0.05, 0.1, 0.15, 0.2]
+    return toy_model(successor, rng.normal(size=(6, 3)), np.ones((6, 3), bool), crosses)
+
+
+def every_trajectory(model: TabularModel, goal: int) -> tuple[Bools, Floats]:
+    """Which regions each trajectory from cell 0 crosses, and its probability, by listing them."""
+    crosses = model.crosses.toarray().reshape(model.states, model.moves, -1)
+    crossed, weight = [], []
+    for sequence in itertools.product(range(model.moves), repeat=STEPS):
+        state, reward, row = 0, 0.0, np.zeros(4, dtype=bool)
+        for move in sequence:
+            reward += model.reward[state, move]
+            row |= crosses[state, move]
+            state = model.successor[state, move]
+        if state == goal:
+            crossed.append(row)
+            weight.append(np.exp(reward))
+    return np.array(crossed), np.array(weight) / np.sum(weight)
+
+
+def test_p_is_the_weight_of_trajectories_at_least_as_extreme() -> None:
+    """For every set of regions that a trajectory can cross; 40000 draws, five standard errors."""
+    model, goal, draws = toy_world(), 3, 40_000
+    crossed, weight = every_trajectory(model, goal)
+    phi = weight @ crossed
+    sets = np.unique(crossed, axis=0)
+    assert len(sets) > 5
+    distribution = TrajectoryDistribution(model, 0, np.array([goal]), STEPS)
+    result = misfit([distribution] * len(sets), np.tile(phi, (len(sets), 1)), sets, samples=draws)
+    counts, distances = crossed.sum(axis=1), np.abs(phi - crossed).sum(axis=1)
+    for j, one in enumerate(sets):
+        count, distance = one.sum(), np.abs(phi - one).sum()
+        assert result.count[j] == count
+        assert result.distance[j] == pytest.approx(distance)
+        tail = min(weight[counts >= count].sum(), weight[counts <= count].sum())
+        assert result.count_p[j] == pytest.approx(min(1, 2 * tail), abs=5 / np.sqrt(draws))
+        far = weight[distances >= distance - 1e-9].sum()
+        assert result.distance_p[j] == pytest.approx(far, abs=2.5 / np.sqrt(draws))
+
+
+SYSTEM = DoubleIntegrator()
+MODEL = discretize(
+    SYSTEM,
+    Grid(SYSTEM.space, (9, 8)),
+    action_grid(SYSTEM, 5),
+    0.5,
+    Regions.from_grid(SYSTEM.space, (6, 6)),
+)
+
+
+@pytest.mark.parametrize("exact_ends", [True, False])
+@pytest.mark.parametrize("horizon", [0.5, 1.0, 4.0])
+def test_draws_cross_regions_as_often_as_the_exact_probabilities_say(
+    horizon: float, exact_ends: bool
+) -> None:
+    """One move, two, and many; 20000 draws, five standard errors."""
+    task = Task(np.array([-0.6, 0.3]), Box([-0.9, -np.inf], [1.0, np.inf]), horizon)
+    distribution = TrajectoryDistribution.of_task(MODEL, task, exact_ends=exact_ends)
+    phi, draws = distribution.violation_probabilities(), 20_000
+    crossed = sample_crossings(distribution, draws, np.random.default_rng(1))
+    error = np.sqrt(phi * (1 - phi) / draws)
+    assert np.all(np.abs(crossed.mean(axis=0) - phi) <= 5 * error + 1e-12)
+    assert np.any((phi > 0.01) & (phi < 0.99))
+
+
+def test_the_models_own_trajectories_are_rarely_called_rare() -> None:
+    """300 of them; at most 1 in 50 is expected, and a path all over the place is always rare."""
+    task = Task(np.array([-1.0, 0.0]), Box.point([1.0, 0.0]), 5.0)
+    distribution = TrajectoryDistribution.of_task(MODEL, task, exact_ends=True)
+    own = sample_crossings(distribution, 300, np.random.default_rng(2))
+    phi = np.tile(distribution.violation_probabilities(), (300, 1))
+    share = np.mean(misfit([distribution] * 300, phi, own).is_rare)
+    assert share < 0.05
+    everywhere = misfit([distribution], phi[:1], np.ones((1, 36), dtype=bool))
+    assert everywhere.is_rare.all()
+    assert everywhere.count_p == pytest.approx(2 / 250)
+    assert everywhere.distance_p == pytest.approx(1 / 250)
+    again = misfit([distribution], phi[:1], np.ones((1, 36), dtype=bool))
+    assert again.distance_p == everywhere.distance_p
+
+
+def test_a_mask_picks_the_hypotheses() -> None:
+    task = Task(np.array([-1.0, 0.0]), Box.point([1.0, 0.0]), 5.0)
+    distribution = TrajectoryDistribution.of_task(MODEL, task, exact_ends=True)
+    mask = np.arange(36) % 3 == 1
+    phi = distribution.violation_probabilities()[None, mask]
+    own = sample_crossings(distribution, 1, np.random.default_rng(3))[:, mask]
+    result = misfit([distribution], phi, own, hypotheses=mask)
+    assert result.count == own.sum()
+    assert not result.is_rare.any()
+
+
+@pytest.mark.parametrize("exact_ends", [True, False])
+def test_a_task_that_cannot_be_done_has_no_p(exact_ends: bool) -> None:
+    task = Task(np.array([-2.9, 0.0]), Box.point([2.9, 0.0]), 1.0)
+    distribution = TrajectoryDistribution.of_task(MODEL, task, exact_ends=exact_ends)
+    result = misfit([distribution], np.zeros((1, 36)), np.ones((1, 36), dtype=bool))
+    assert np.isnan([result.count_p, result.distance_p]).all()
+    assert not result.is_rare.any()
+    with pytest.raises(ValueError, match="reaches a goal"):
+        sample_crossings(distribution, 1, np.random.default_rng(0))
