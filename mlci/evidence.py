@@ -54,6 +54,11 @@ class Rates:
 PAPER = Rates()
 DEFAULT_MODEL_ERROR = 0.1  # where no forecasts have been scored; the ratio itself favours 0
 
+# See `decided_by_cell`. Below the first, the default model error leaves a pair within .01 nat of
+# what certainty brings, so that 7 nat or 81 are no less certain than an exact 0. The second is ten
+# times that, so that a pair whose probability only shifts with its ends is not one they decide.
+_NEARLY_0, _NOT_0 = 1e-3, 1e-2
+
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
@@ -106,6 +111,20 @@ def log_evidence(avoidance: ArrayLike, violated: ArrayLike, rates: Rates = PAPER
             (1 - eta) * alpha + eta
         )
         return np.where(crossed, np.log(eps), of_avoiding)
+
+
+def decided_by_cell(between_cells: ArrayLike, between_states: ArrayLike) -> Bools:
+    """Which pairs (N, C) a cell decides: they are no evidence.
+
+    The tabular agent is certain, or nearly certain, to enter a region if it begins and ends at the
+    centres of cells, and can avoid it if it begins and ends where the demonstration does. That such
+    a demonstration avoids the region says where it lies in its cell, and nothing of a constraint.
+
+    Args:
+        between_cells: (N, C) alpha of trajectories from cell to cell.
+        between_states: (N, C) alpha of trajectories from state to state.
+    """
+    return (np.asarray(between_cells) < _NEARLY_0) & (np.asarray(between_states) > _NOT_0)
 
 
 def total_gain(evidence: Floats) -> Floats:

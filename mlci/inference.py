@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,10 @@ from mlci.regions import Regions
 from mlci.spaces import Bools, Floats, Ints
 
 _ROWS_OF_REPR, _ROWS_OF_SUMMARY = 5, 10
+_ROUNDED = 1e-12  # what sums of probabilities are off by
+
+# What became of a hypothesis, see `Inference.outcomes`.
+FEASIBLE, VIOLATED, UNAVOIDABLE, UNREACHABLE = "feasible", "violated", "unavoidable", "unreachable"
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +34,9 @@ class Inference:
         reachable: (N,) whether the tabular model can do the task.
         prior_none: prior probability that there is no constraint.
         rates: model error and rule breaking of the demonstrators.
+        decided_by_cell: (N, C) pairs that are no evidence, since a hypothesis is certain to be
+            entered only because of the cell in which the task starts or ends; none by default. See
+            `mlci.evidence.decided_by_cell`.
 
     Raises:
         ValueError: shapes that disagree.
@@ -42,22 +49,24 @@ class Inference:
     reachable: Bools
     prior_none: float = 0.5
     rates: Rates = PAPER
+    decided_by_cell: Bools = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
 
     def __post_init__(self) -> None:
         shape = len(self.names), len(self.hypotheses)
-        if not (
-            self.phi.shape == self.violated.shape == shape == (*self.reachable.shape, shape[1])
-        ):
+        if not self.decided_by_cell.size:
+            object.__setattr__(self, "decided_by_cell", np.zeros(shape, dtype=bool))
+        arrays = (self.avoidance, self.violated, self.decided_by_cell)
+        if any(array.shape != shape for array in arrays) or self.reachable.shape != shape[:1]:
             raise ValueError(
                 f"{shape[0]} demonstrations and {shape[1]} hypotheses do not fit avoidance "
-                f"{self.avoidance.shape}, violated {self.violated.shape}, reachable "
-                f"{self.reachable.shape}"
+                f"{self.avoidance.shape}, violated {self.violated.shape}, decided_by_cell "
+                f"{self.decided_by_cell.shape}, reachable {self.reachable.shape}"
             )
 
     @cached_property
     def ranking(self) -> Ranking:
         """Gain, rank and posterior of each hypothesis, equations (4) to (6)."""
-        return rank_constraints(self.avoidance, self.violated, self.prior_none, rates=self.rates)
+        return rank_constraints(self.forecast, self.violated, self.prior_none, rates=self.rates)
 
     @property
     def phi(self) -> Floats:
@@ -65,9 +74,30 @@ class Inference:
         return 1.0 - self.avoidance
 
     @cached_property
+    def forecast(self) -> Floats:
+        """(N, C) probability of avoiding, as it counts for evidence: 1 where a cell decides."""
+        return np.where(self.decided_by_cell, 1.0, self.avoidance)
+
+    @cached_property
     def evidence(self) -> Floats:
         """(N, C) log evidence of each demonstration for each hypothesis [nat]."""
-        return log_evidence(self.avoidance, self.violated, self.rates)
+        return log_evidence(self.forecast, self.violated, self.rates)
+
+    @cached_property
+    def outcomes(self) -> np.ndarray:
+        """(C,) what became of each hypothesis.
+
+        `violated`: a demonstration enters it. `unavoidable`: none does, although the tabular agent
+        cannot but enter it in one of the tasks; without model error its gain is infinite.
+        `unreachable`: no demonstration enters it, nor could the tabular agent in any task, so that
+        nothing speaks for it. `feasible`: none of these.
+        """
+        cases = [
+            (VIOLATED, np.any(self.violated, axis=0)),
+            (UNAVOIDABLE, self.gain == np.inf),
+            (UNREACHABLE, np.all(self.phi < _ROUNDED, axis=0)),
+        ]
+        return np.select([case for _, case in cases], [name for name, _ in cases], FEASIBLE)
 
     @property
     def gain(self) -> Floats:
@@ -98,6 +128,7 @@ class Inference:
             avoidance=self.avoidance[part],
             violated=self.violated[part],
             reachable=self.reachable[part],
+            decided_by_cell=self.decided_by_cell[part],
         )
 
     @property
@@ -109,9 +140,22 @@ class Inference:
                 f"the tabular model cannot reach the goal of {', '.join(lost)}: evidence against "
                 "what they violate, and for nothing"
             )
-        if unavoidable := np.flatnonzero(self.gain == np.inf).tolist():
-            names = ", ".join(self.hypotheses.names[i] for i in unavoidable)
-            found.append(f"some tabular agent cannot avoid {names}: their gain is infinite")
+        regions = np.array(self.hypotheses.names)
+        if (unavoidable := self.outcomes == UNAVOIDABLE).any():
+            found.append(
+                f"unavoidable: {', '.join(regions[unavoidable])}; the tabular agent cannot but "
+                "enter, which no demonstration does, so that nothing else has any probability"
+            )
+        pairs = self.decided_by_cell & ~self.violated
+        if (decided := pairs.any(axis=0)).any():
+            whose = (
+                f"{region} ({', '.join(np.array(self.names)[pairs[:, i]])})"
+                for i, region in zip(np.flatnonzero(decided), regions[decided], strict=True)
+            )
+            found.append(
+                "no evidence, since a start's or goal's cell alone makes it certain to be entered: "
+                + ", ".join(whose)
+            )
         return found
 
     def to_frame(self) -> pd.DataFrame:
@@ -119,8 +163,8 @@ class Inference:
 
         Returns:
             `hypothesis`, its name; for each dimension that some hypothesis bounds, `<name> from
-            [unit]` and `<name> to [unit]`; `rank`, `gain` [nat], `posterior`, and `violated_by`,
-            the number of demonstrations.
+            [unit]` and `<name> to [unit]`; `outcome`, see `outcomes`; `rank`, `gain` [nat], missing
+            where it is unavoidable; `posterior`; and `violated_by`, the number of demonstrations.
         """
         space, columns = self.hypotheses.space, {"hypothesis": np.array(self.hypotheses.names)}
         for d, (name, unit) in enumerate(zip(space.names, space.units, strict=True)):
@@ -129,8 +173,9 @@ class Inference:
                 in_unit = f" [{unit}]" if unit else ""
                 columns |= {f"{name} from{in_unit}": lower, f"{name} to{in_unit}": upper}
         columns |= {
+            "outcome": self.outcomes,
             "rank": self.ranking.rank,
-            "gain": self.gain,
+            "gain": np.where(self.outcomes == UNAVOIDABLE, np.nan, self.gain),
             "posterior": self.posterior,
             "violated_by": np.sum(self.violated, axis=0),
         }

@@ -8,14 +8,14 @@ hypotheses they violate, and to rank the others. `infer` does both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from mlci.demonstrations import REACHED, Demonstration, Task, departures
-from mlci.evidence import DEFAULT_MODEL_ERROR, Rates
+from mlci.evidence import DEFAULT_MODEL_ERROR, Rates, decided_by_cell
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions, as_mask
@@ -33,6 +33,8 @@ class PreparedInference:
         avoidance: (N, C) probability that the unconstrained agent avoids a hypothesis; 1 where it
             says nothing.
         reachable: (N,) whether the tabular model can do the task.
+        decided_by_cell: (N, C) pairs that are no evidence, see `mlci.evidence.decided_by_cell`;
+            none where trajectories begin and end at cells.
 
     Raises:
         ValueError: shapes that disagree.
@@ -42,13 +44,23 @@ class PreparedInference:
     hypotheses: Regions
     avoidance: Floats
     reachable: Bools
+    decided_by_cell: Bools
 
     def __post_init__(self) -> None:
         shape = len(self.tasks), len(self.hypotheses)
-        if self.avoidance.shape != shape or self.reachable.shape != shape[:1]:
+        if (
+            not self.avoidance.shape
+            == self.decided_by_cell.shape
+            == shape
+            == (
+                *self.reachable.shape,
+                shape[1],
+            )
+        ):
             raise ValueError(
-                f"avoidance {self.avoidance.shape} and reachable {self.reachable.shape} do not fit "
-                f"{shape[0]} tasks and {shape[1]} hypotheses"
+                f"avoidance {self.avoidance.shape}, reachable {self.reachable.shape} and "
+                f"decided_by_cell {self.decided_by_cell.shape} do not fit {shape[0]} tasks and "
+                f"{shape[1]} hypotheses"
             )
 
     def infer(
@@ -104,6 +116,7 @@ class PreparedInference:
             self.reachable[numbers],
             prior_none,
             Rates(DEFAULT_MODEL_ERROR) if rates is None else rates,
+            self.decided_by_cell[numbers],
         )
 
     def _path(self, path: ArrayLike, dt: float, number: int, name: str, tolerance: float) -> Floats:
@@ -200,26 +213,31 @@ def prepare(
         )
         for task in tasks
     ]
-    avoidance, reachable = np.ones((len(tasks), count)), np.zeros(len(tasks), dtype=bool)
+    avoidance, decided = np.ones((len(tasks), count)), np.zeros((len(tasks), count), dtype=bool)
+    reachable = np.zeros(len(tasks), dtype=bool)
     if tasks:
         _ = model.merged  # once for all tasks and processes
     work = Parallel(n_jobs=n_jobs, return_as="generator")(
         delayed(_avoidance_probabilities)(distribution) for distribution in distributions
     )
-    for j, (is_possible, probabilities) in enumerate(work):
-        reachable[j], avoidance[j] = is_possible, probabilities
+    for j, of_task in enumerate(work):
+        reachable[j], avoidance[j], decided[j] = of_task
         if progress is not None:
             progress(j + 1, len(tasks))
     return PreparedInference(
-        tuple(tasks), model.regions.select(mask), avoidance[:, mask], reachable
+        tuple(tasks), model.regions.select(mask), avoidance[:, mask], reachable, decided[:, mask]
     )
 
 
-def _avoidance_probabilities(distribution: TrajectoryDistribution) -> tuple[bool, Floats]:
-    """Whether a task can be done, and alpha (C,) of it, 1 if it cannot."""
-    if distribution.is_possible:
-        return True, distribution.avoidance_probabilities()
-    return False, np.ones(len(distribution.model.regions))
+def _avoidance_probabilities(distribution: TrajectoryDistribution) -> tuple[bool, Floats, Bools]:
+    """Whether a task can be done, its alpha (C,), 1 if it cannot, and what a cell decides (C,)."""
+    nothing = np.zeros(len(distribution.model.regions), dtype=bool)
+    if not distribution.is_possible:
+        return False, np.ones(len(nothing)), nothing
+    alpha, between_cells = distribution.avoidance_probabilities(), replace(distribution, ends=None)
+    if distribution.ends is None or not between_cells.is_possible:
+        return True, alpha, nothing
+    return True, alpha, decided_by_cell(between_cells.avoidance_probabilities(), alpha)
 
 
 def _violations(hypotheses: Regions, paths: Sequence[ArrayLike]) -> Bools:

@@ -11,8 +11,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from paper_figures.plane import Plane, numbered, outline
-from paper_figures.rows import described
-from paper_figures.style import COLUMN, EDGE, GAIN, PATH, RC, TRUTH, VIOLATED, new_figure
+from paper_figures.rows import described, gain_in_words
+from paper_figures.style import (
+    COLUMN,
+    EDGE,
+    GAIN,
+    PATH,
+    RC,
+    TRUTH,
+    UNAVOIDABLE,
+    VIOLATED,
+    new_figure,
+)
 
 TABLES = {
     "example_ranking": ("truth", "cells", "actions", "dt", "hypothesis", "gain", "rank"),
@@ -29,8 +39,9 @@ def draw(
     """Draw one ranking.
 
     Args:
-        example_ranking: one row a hypothesis: rank, gain [nat], feasible, and lower_<d>, upper_<d>
-            of each dimension d; optionally `covered_by_truth`, and what the point was.
+        example_ranking: one row a hypothesis: rank, gain [nat], missing where it is unavoidable,
+            feasible, and lower_<d>, upper_<d> of each dimension d; optionally `covered_by_truth`,
+            and what the point was.
         example_paths: the demonstrations: demonstration, and a column for each dimension.
         example_dimensions: name, unit, lower, upper and periodic of each dimension of the state.
             The first two that hypotheses bound are drawn, or, where they bound one, that and
@@ -48,6 +59,9 @@ def draw(
         cells = plane.cells(axes, hypotheses[feasible], array=root, cmap=GAIN)
         cells.set_clim(0, np.sqrt(top))
         plane.cells(axes, hypotheses[~feasible], facecolor=VIOLATED)
+        unavoidable = np.isnan(gain)
+        if unavoidable.any():
+            plane.cells(axes, hypotheses[unavoidable], facecolor=UNAVOIDABLE)
         _draw_paths(axes, example_paths, plane)
         for row, box in zip(hypotheses.itertuples(), plane.rectangles(hypotheses), strict=True):
             if row.feasible and row.rank <= TOP and row.gain > 0:
@@ -62,7 +76,7 @@ def draw(
         bar.set_ticks(np.sqrt(ticks).tolist(), labels=[f"{tick:.2g}" for tick in ticks])
         bar.set_label("likelihood gain $L_i$ [nat]")
         bar.outline.set_linewidth(0.5)
-        _legend(figure, "covered_by_truth" in hypotheses)
+        _legend(figure, "covered_by_truth" in hypotheses, bool(unavoidable.any()))
     return figure
 
 
@@ -78,7 +92,7 @@ def facts(
         f"Demonstrations: {example_paths['demonstration'].nunique()}.",
         f"Hypotheses: {len(best)}, of which some demonstration violates {ruled_out}.",
         *(
-            f"Rank {row.rank:g}: hypothesis {row.hypothesis}, gain {row.gain:.3g} nat, "
+            f"Rank {row.rank:g}: hypothesis {row.hypothesis}, {gain_in_words(row.gain)}, "
             f"posterior {row.posterior:.3g}{', inside the truth' * bool(row.covered_by_truth)}."
             for row in best.head(TOP).itertuples()
         ),
@@ -96,7 +110,7 @@ def _draw_paths(axes: Axes, paths: pd.DataFrame, plane: Plane) -> None:
         axes.plot(*points[-1], "s", color=PATH, markersize=2.2, zorder=3)
 
 
-def _legend(figure: Figure, with_truth: bool) -> None:
+def _legend(figure: Figure, with_truth: bool, with_unavoidable: bool) -> None:
     """What the signs mean, below the axes."""
     entries: list[object] = [
         Line2D([], [], color=PATH, linewidth=0.7, label="demonstration"),
@@ -105,6 +119,8 @@ def _legend(figure: Figure, with_truth: bool) -> None:
         Patch(facecolor=VIOLATED, edgecolor=EDGE, linewidth=0.5, label="violated"),
         Patch(facecolor="white", edgecolor="black", linewidth=1.0, label=f"top {TOP}, by rank"),
     ]
+    if with_unavoidable:
+        entries.append(Patch(facecolor=UNAVOIDABLE, label="unavoidable"))
     if with_truth:
         entries.append(Patch(facecolor="white", edgecolor=TRUTH, linewidth=1.6, label="truth"))
     figure.legend(handles=entries, loc="outside lower center", ncols=3)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from paper_figures.plane import Plane, axis_label, centre, numbered, outline
-from paper_figures.rows import Unsuited, described
+from paper_figures.rows import Unsuited, described, gain_in_words
 from paper_figures.style import (
     CHANCE,
     DEMONSTRATION,
@@ -25,6 +25,7 @@ from paper_figures.style import (
     RC,
     SAMPLED,
     TRUTH,
+    UNAVOIDABLE,
     VIOLATED,
     new_figure,
 )
@@ -122,8 +123,8 @@ def facts(
         f"4: hypotheses that no demonstration violates, {int(ranking['feasible'].sum())} of "
         f"{len(ranking)}, ranked by likelihood gain; true constraint outlined.",
         *(
-            f"Rank of hypothesis {row.hypothesis}, inside the truth: {row.rank:g}, gain "
-            f"{row.gain:.3g} nat, Phi in panel 3 {row.unconstrained:.3g}."
+            f"Rank of hypothesis {row.hypothesis}, inside the truth: {row.rank:g}, "
+            f"{gain_in_words(row.gain)}, Phi in panel 3 {row.unconstrained:.3g}."
             for row in inside.itertuples()
         ),
         f"Trial {trial} is the one that would most likely violate the truth if it were allowed.",
@@ -207,8 +208,10 @@ def _draw_ranking(
     """The gain of the hypotheses that no demonstration violates, by its square root; best ranks."""
     feasible = ranking[ranking["feasible"].astype(bool)]
     plane.cells(axes, ranking, facecolor=VIOLATED)
-    root = np.sqrt(feasible["gain"].replace(np.inf, np.nan))
+    root = np.sqrt(feasible["gain"])
     cells = plane.cells(axes, feasible, array=root, cmap=GAIN)
+    if root.isna().any():
+        plane.cells(axes, feasible[root.isna()], facecolor=UNAVOIDABLE)
     cells.set_clim(0, max(float(root.max()), 1e-3))
     best = feasible[(feasible["rank"] <= _NUMBERED) & (feasible["gain"] > 0)]
     for row, box in zip(best.itertuples(), plane.rectangles(best), strict=True):

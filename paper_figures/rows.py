@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import pandas as pd
 
 # What the paper's figures show, where a study holds it; the nearest that it holds otherwise.
@@ -43,6 +44,11 @@ def paper_rows(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
     if rows.duplicated(list(keys)).any():
         raise Unsuited(f"rows differ in more than {', '.join(keys)}")
     return rows.sort_values(list(keys), kind="stable")
+
+
+def gain_in_words(gain: float) -> str:
+    """The gain of a hypothesis; missing where the tabular agent cannot avoid it."""
+    return "unavoidable" if np.isnan(gain) else f"gain {gain:.3g} nat"
 
 
 def described(rows: pd.DataFrame, step: str = "dt") -> str:

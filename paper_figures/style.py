@@ -37,6 +37,7 @@ GAIN, CHANCE = "YlGnBu", "PuRd"  # one colour each, dark for much: a hypothesis'
 PATH = "#444444"  # of demonstrations among many
 EDGE = "#b0b0b0"  # between hypotheses
 VIOLATED = "#e8e8e8"  # hypotheses that some demonstration violates
+UNAVOIDABLE = "#1a1a1a"  # those whose gain is infinite, see `mlci.inference`
 GUIDE = "#888888"  # lines that help the eye
 
 RC = {

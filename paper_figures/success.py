@@ -12,7 +12,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from paper_figures.plane import Plane, numbered
-from paper_figures.rows import ALL_TASKS, DEFAULT, Unsuited, by_tasks, described, with_cases
+from paper_figures.rows import (
+    ALL_TASKS,
+    DEFAULT,
+    Unsuited,
+    by_tasks,
+    described,
+    gain_in_words,
+    with_cases,
+)
 from paper_figures.style import (
     DEMONSTRATION,
     EDGE,
@@ -141,7 +149,7 @@ def facts(
         for place, row in enumerate(_best(ranking).itertuples(), start=1):
             where = "inside" if row.covered_by_truth else "across" if row.overlaps_truth else "off"
             lines.append(
-                f"  {place}: hypothesis {row.hypothesis}, gain {row.gain:.3g} nat, posterior "
+                f"  {place}: hypothesis {row.hypothesis}, {gain_in_words(row.gain)}, posterior "
                 f"{row.posterior:.3g}, {where} the truth"
             )
         curve = _of_tasks(curves, words)
@@ -172,8 +180,8 @@ def _of_tasks(curves: dict[str, pd.DataFrame], words: str) -> pd.DataFrame:
 
 
 def _best(ranking: pd.DataFrame) -> pd.DataFrame:
-    """The best hypotheses that gain anything."""
-    ordered = ranking[ranking["gain"] > 0].sort_values(["rank", "hypothesis"], kind="stable")
+    """The best hypotheses that gain anything, be it more than any number."""
+    ordered = ranking[~(ranking["gain"] <= 0)].sort_values(["rank", "hypothesis"], kind="stable")
     return ordered.head(_BEST)
 
 

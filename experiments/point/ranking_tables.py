@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from scipy.special import expit, logit
 
 from experiments.config.settings import Settings
 from experiments.point.truth_tables import box_table
-from mlci.evidence import confidence
-from mlci.inference import Inference
+from mlci.inference import UNAVOIDABLE, Inference
 from mlci.metrics import random_subsets, top_chances, truth_ranks
 
 BEST = (1, 2)  # so many of the best hypotheses are compared with the truth, as in Fig. 7
@@ -52,21 +52,22 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
 
 
 def ranking_table(inference: Inference) -> pd.DataFrame:
-    """A row a hypothesis: its box, gain, rank and probabilities."""
+    """A row a hypothesis: its box, outcome, gain, rank and probabilities.
+
+    The gain of what is unavoidable is missing: it is infinite, as `outcome` says.
+    `confidence_alone` is (12), whose product over demonstrations is e^-gain.
+    """
     ranking, hypotheses = inference.ranking, inference.hypotheses
     prior = (1 - inference.prior_none) / len(hypotheses)
-    certainty = [
-        confidence(prior, inference.avoidance[:, i]) if ranking.feasible[i] else 0.0
-        for i in range(len(hypotheses))
-    ]
     return pd.DataFrame(
         {
             **box_table("hypothesis", hypotheses),
             "feasible": ranking.feasible,
             "violating_demonstrations": np.sum(inference.violated, axis=0),
-            "gain": ranking.gain,
+            "outcome": inference.outcomes,
+            "gain": np.where(inference.outcomes == UNAVOIDABLE, np.nan, ranking.gain),
             "rank": ranking.rank,
             "posterior": ranking.posterior,
-            "confidence_alone": certainty,
+            "confidence_alone": expit(logit(prior) + ranking.gain),
         }
     )

@@ -8,6 +8,7 @@ import pytest
 from mlci.evidence import (
     Rates,
     confidence,
+    decided_by_cell,
     log_evidence,
     posterior,
     printed_confidence,
@@ -189,3 +190,10 @@ def test_a_rate_outside_its_range_is_refused(rate: float) -> None:
         Rates(model_error=rate)
     with pytest.raises(ValueError, match=r"rule_breaking must lie in \[0, 1\)"):
         Rates(rule_breaking=rate)
+
+
+def test_a_cell_decides_what_is_certain_only_between_cells() -> None:
+    between_cells = [[0.0, 2.7e-20, 6.7e-36, 9e-4, 0.0, 0.002, 0.5, 1.0]]
+    between_states = [[0.3, 0.02, 1.0, 0.9, 1e-20, 0.9, 0.0, 1.0]]
+    expected = [[True, True, True, True, False, False, False, False]]
+    assert decided_by_cell(between_cells, between_states).tolist() == expected

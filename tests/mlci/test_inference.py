@@ -16,8 +16,8 @@ from mlci.maxent import TrajectoryDistribution
 from mlci.preparation import PreparedInference, infer, prepare
 from mlci.regions import Regions
 from mlci.simulate import rollout
-from mlci.spaces import Box
-from mlci.systems import DoubleIntegrator, Pendulum
+from mlci.spaces import Box, StateSpace
+from mlci.systems import DoubleIntegrator, FunctionSystem, Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize
 
 SYSTEM = DoubleIntegrator()
@@ -144,13 +144,14 @@ def hand_made() -> Inference:
 def test_the_frame_has_a_row_a_hypothesis_with_names_and_units() -> None:
     frame = hand_made().to_frame()
     assert list(frame) == [
-        "hypothesis", "position from [m]", "position to [m]", "rank", "gain", "posterior",
-        "violated_by",
+        "hypothesis", "position from [m]", "position to [m]", "outcome", "rank", "gain",
+        "posterior", "violated_by",
     ]  # fmt: skip
     assert frame["hypothesis"].tolist() == ["right", "middle", "left"]
     assert frame["position from [m]"].tolist() == [1.0, 0.0, -1.0]
     assert frame["position to [m]"].tolist() == [2.0, 1.0, 0.0]
-    assert frame["gain"].tolist() == [np.inf, -np.log(0.25), -np.inf]
+    assert frame["outcome"].tolist() == ["unavoidable", "feasible", "violated"]
+    np.testing.assert_array_equal(frame["gain"], [np.nan, -np.log(0.25), -np.inf])
     assert frame["violated_by"].tolist() == [0, 0, 1]
     assert frame["rank"].tolist() == [1, 2, 3]
 
@@ -159,7 +160,7 @@ def test_repr_and_summary_say_what_was_inferred_and_what_is_doubtful() -> None:
     text = repr(hand_made())
     assert text.startswith("2 demonstrations, 3 hypotheses; probability of no constraint 0\n")
     assert "cannot reach the goal of second" in text
-    assert "cannot avoid right: their gain is infinite" in text
+    assert "unavoidable: right; the tabular agent cannot but enter" in text
     many = Inference(
         HYPOTHESES, ("a",), np.ones((1, 100)), np.zeros((1, 100), bool), np.ones(1, bool)
     )
@@ -180,7 +181,7 @@ def test_wrong_input_is_refused(model: TabularModel, prepared: PreparedInference
             prepared.infer([path], 0.01, [wrong])
     fewer = Regions.from_grid(SYSTEM.space, (5, 5))
     with pytest.raises(
-        ValueError, match=r"avoidance \(4, 100\) .* do not fit 4 tasks and 25 hypotheses"
+        ValueError, match=r"avoidance \(4, 100\).* do not fit 4 tasks and 25 hypotheses"
     ):
         replace(prepared, hypotheses=fewer)
     with pytest.raises(ValueError, match="mask over 100 regions"):
@@ -260,3 +261,62 @@ def test_exact_ends_and_rates_reach_the_evidence(model: TabularModel) -> None:
     np.testing.assert_array_equal(default.avoidance, exact.avoidance)
     assert default.rates == Rates(model_error=DEFAULT_MODEL_ERROR)
     assert 0 < np.max(default.evidence) <= -np.log(DEFAULT_MODEL_ERROR)
+
+
+def test_outcomes_are_named() -> None:
+    of = hand_made()
+    assert of.outcomes.tolist() == ["violated", "feasible", "unavoidable"]
+    doubted = replace(of, rates=Rates(0.1))
+    assert doubted.outcomes.tolist() == ["violated", "feasible", "feasible"]
+    assert doubted.gain[2] == pytest.approx(-np.log(0.1))
+    assert of.of([1]).outcomes.tolist() == ["unreachable"] * 3
+
+
+def test_with_model_error_no_set_of_demonstrations_has_an_infinite_gain() -> None:
+    """Whatever is avoided or violated, however unlikely, and however often."""
+    rng = np.random.default_rng(8)
+    for _ in range(200):
+        count = int(rng.integers(1, 40))
+        alpha = rng.choice([0.0, 1e-300, 1e-20, 0.5, 1.0], (count, 3)) * rng.random((count, 3))
+        one = replace(
+            hand_made(),
+            names=tuple(map(str, range(count))),
+            avoidance=alpha,
+            violated=rng.random((count, 3)) < 0.01,
+            reachable=np.ones(count, dtype=bool),
+            decided_by_cell=np.zeros((count, 3), dtype=bool),
+            rates=Rates(DEFAULT_MODEL_ERROR),
+        )
+        assert np.all(one.gain <= -count * np.log(DEFAULT_MODEL_ERROR) + 1e-9)
+        assert not np.any(one.outcomes == "unavoidable")
+        assert not np.any(np.isnan(one.posterior))
+
+
+# A floor of 4 x 3 tiles on which one steps to a neighbour in 1 s, round a pillar that holds the
+# centre of the tile in which the task starts, but not the start.
+FLOOR = StateSpace(Box([0.0, 0.0], [4.0, 3.0]), [False, False], ("x", "y"), ("m", "m"))
+WALKER = FunctionSystem(lambda x, u: (u[..., 0], u[..., 1]), FLOOR, Box([-1, -1], [1, 1]))
+PILLARS = Regions.from_boxes(
+    FLOOR, [Box([0.4, 1.4], [1.3, 1.6]), Box([1.4, 0.0], [1.6, 3.0])], ["pillar", "wall"]
+)
+
+
+def test_what_only_a_cell_makes_certain_is_no_evidence_and_is_named() -> None:
+    model = discretize(WALKER, Grid(FLOOR, (4, 3)), action_grid(WALKER, 3), 1.0, PILLARS)
+    path = np.linspace([0.9, 1.1], [3.5, 1.5], 301)
+    beside = Demonstration(Task(path[0], Box.point(path[-1]), 3.0), path, None, 0.01, "beside")
+    of_cells, inference = papers(model, [beside]), infer(model, [beside], rates=PAPER)
+    assert of_cells.gain[0] == np.inf
+    assert of_cells.outcomes.tolist() == ["unavoidable", "violated"]
+    assert inference.decided_by_cell.tolist() == [[True, False]]
+    assert inference.gain[0] == 0
+    assert 0.1 < inference.avoidance[0, 0] < 0.9
+    assert inference.outcomes[0] == "feasible"
+    assert (
+        "no evidence, since a start's or goal's cell alone makes it certain to be entered: "
+        "pillar (beside)"
+    ) in inference.warnings
+    np.testing.assert_array_equal(inference.of([0]).gain, inference.gain)
+    violating = replace(inference, violated=np.ones((1, 2), dtype=bool))
+    assert violating.gain[0] == -np.inf
+    assert not any("no evidence" in warning for warning in violating.warnings)

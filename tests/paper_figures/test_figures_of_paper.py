@@ -339,6 +339,19 @@ def test_hypothesis_map_shows_what_the_table_says(drawn: Drawn, tables_for: Tabl
     assert f"Rank 1: hypothesis {first['hypothesis']}, gain {first['gain']:.3g} nat" in said
 
 
+def test_map_names_what_is_unavoidable(tables_for: TablesFor) -> None:
+    tables = tables_for(hypothesis_map)
+    ranking = tables["example_ranking"]
+    infinite = ranking["rank"] == 1
+    missing = ranking.assign(gain=ranking["gain"].mask(infinite))
+    figure = hypothesis_map.draw(**{**tables, "example_ranking": missing})
+    _, _, unavoidable = boxes(figure.axes[0])
+    np.testing.assert_allclose(extent(unavoidable), corners(ranking[infinite]))
+    assert "unavoidable" in [text.get_text() for text in figure.legends[0].get_texts()]
+    said = hypothesis_map.facts(**{**tables, "example_ranking": missing})
+    assert f"Rank 1: hypothesis {ranking['hypothesis'][infinite].iloc[0]}, unavoidable" in said
+
+
 def test_map_says_which_point_it_is() -> None:
     tables = {name: study_tables()[name].query("truth == 'c2'") for name in hypothesis_map.TABLES}
     point = f"Point {POINTS['c2']}: truth C2, 400 cells, 9 actions, dt = 0.25 s."
