@@ -22,6 +22,7 @@ from experiments.lookback.cleaning import clean
 from experiments.lookback.export import file_bytes, tidy_table
 from experiments.lookback.freshness import point_concerns
 from experiments.lookback.query import select
+from experiments.lookback.recordings import write_recordings
 from experiments.lookback.views import (
     differences,
     point_facts,
@@ -86,6 +87,9 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--table", default="summary", help="whose rows; summary has one a point")
     one.add_argument("--format", choices=["csv", "parquet"], default="csv")
     one.add_argument("--out", type=Path, metavar="FILE", help="default: the terminal")
+    one = add("demonstrations", _demonstrations, "a point's demonstrations, as recorded files")
+    one.add_argument("point", metavar="POINT")
+    one.add_argument("--out", type=Path, metavar="FOLDER", required=True, help="new or empty")
     one = add("clean", _clean, "list what no study uses: points, stored stages, dead files")
     one.add_argument("--yes", action="store_true", help="remove it")
     return parser
@@ -154,6 +158,13 @@ def _export(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
         yield f"written: {options.out} ({len(table)} rows, {table.shape[1]} columns)"
 
 
+def _demonstrations(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
+    """Recorded files of a point's demonstrations."""
+    files = write_recordings(_point(archive, options.point), options.out)
+    yield f"written: {len(files)} demonstrations into {options.out}"
+    yield f"rank by them: python experiments/infer.py demonstrations={options.out}"
+
+
 def _clean(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """What no study uses; removed if told."""
     return clean(archive, remove=options.yes)
@@ -163,7 +174,7 @@ def _point(archive: Archive, name: str) -> Facts:
     """A point that was asked for."""
     item = archive.find(name)
     if isinstance(item, Study):
-        raise ArchiveError(f"{name}: is a study; give two points (see: list {name})")
+        raise ArchiveError(f"{name}: is a study; give a point (see: list {name})")
     return item
 
 

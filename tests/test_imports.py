@@ -66,7 +66,7 @@ ROOMS = {
     "experiments.point": f"{POINT} experiments.console",
     "experiments.collate": TRACKING,
     "experiments.sweep": f"{POINT} experiments.console experiments.point experiments.collate",
-    "experiments.lookback": f"{TRACKING} experiments.collate experiments.config.paths "
+    "experiments.lookback": f"mlci {TRACKING} experiments.collate experiments.config.paths "
     "experiments.config.suggestions experiments.console",
     "paper_figures": f"mlci.regions {TRACKING} experiments.config.paths",
     # The door: the commands, and what they share.

@@ -82,6 +82,11 @@ class Store:
                     _write_entry(folder, key, arrays, made_from)
         return Stored(key, arrays)
 
+    def read(self, stage: str, key: str) -> Stored | None:
+        """The arrays of a stage under a key that a point's record has; None if they are gone."""
+        arrays = _read_entry(self.folder / stage, key)
+        return None if arrays is None else Stored(key, arrays)
+
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
         """Count the time of a block for a stage of the point's record."""

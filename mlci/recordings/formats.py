@@ -3,10 +3,13 @@
 They are told apart by suffix, and the two kinds of CSV by the first line:
 
 * `.csv` with a header: a column `time` [s], one for each state dimension by its name, and
-  optionally `control_1` to `control_m`; one line a sample. Other columns are ignored.
+  optionally `control_1` to `control_m`; one line a sample. The goal may be there as well, in the
+  first sample's line: `goal_lower_NAME` and `goal_upper_NAME` of each dimension, -inf and inf where
+  it is free. Other columns are ignored.
 * `.csv` without a header: one line for each state dimension, then none or one for each control; one
   column a sample, at a time step that the caller knows.
-* `.npz`: `states` (K+1, n), `time` (K+1,) or `dt`, optionally `controls` (K, m) or (K+1, m).
+* `.npz`: `states` (K+1, n), `time` (K+1,) or `dt`, optionally `controls` (K, m) or (K+1, m), and
+  `goal_lower` and `goal_upper` (n,).
 * `.parquet`: the columns of the CSV with a header; needs the package pyarrow.
 
 Only the states count. Controls come along where they are complete, and nothing is computed from
@@ -24,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlci.spaces import Floats
+from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import System
 
 # What numpy and pyarrow raise for damaged files.
@@ -33,12 +36,16 @@ _BROKEN = (ValueError, TypeError, OSError, EOFError, RuntimeError, zipfile.BadZi
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What a file holds: states (K+1, n), controls or None, times (K+1,) and where each stands."""
+    """What a file holds: states (K+1, n), controls or None, times (K+1,), and where each stands.
+
+    The goal is None where the file does not say.
+    """
 
     states: Floats
     controls: Floats | None
     time: Floats
     place: Callable[[int, int], str]  # of a sample and a dimension, to be named in a message
+    goal: Box | None = None
 
 
 def _read_csv(file: Path, system: System, dt: float) -> Recording:
@@ -79,7 +86,7 @@ def _from_columns(rows: list[tuple[int, list[str]]], system: System) -> Recordin
             for line, row in rows[1:]
         ]
     ).reshape(-1, len(columns))
-    return _from_table(table, system, lambda sample, _: f"line {lines[sample]}")
+    return _from_table(table, columns, system, lambda sample, _: f"line {lines[sample]}")
 
 
 def _from_rows(rows: list[tuple[int, list[str]]], system: System, dt: float) -> Recording:
@@ -101,6 +108,7 @@ def _from_rows(rows: list[tuple[int, list[str]]], system: System, dt: float) -> 
     time = np.arange(len(table)) * dt
     return _from_table(
         np.column_stack([time, table]),
+        (),
         system,
         lambda sample, d: f"line {lines[d]}, column {sample + 1}",
     )
@@ -125,10 +133,13 @@ def _read_npz(file: Path, system: System, dt: float) -> Recording:
         time = np.arange(len(states)) * arrays["dt"].item()
     if time.shape != (len(states),):
         raise ValueError(f"needs 'time' of shape ({len(states)},), not {time.shape}")
-    controls = arrays.get("controls")
-    return Recording(
-        states, _complete(controls, len(states)), time, lambda sample, _: f"sample {sample}"
-    )
+    controls, goal = _complete(arrays.get("controls"), len(states)), None
+    if "goal_lower" in arrays and "goal_upper" in arrays:
+        corners = arrays["goal_lower"], arrays["goal_upper"]
+        if any(corner.shape != (n,) for corner in corners):
+            raise ValueError(f"needs 'goal_lower' and 'goal_upper' of shape ({n},)")
+        goal = _box(np.stack(corners))
+    return Recording(states, controls, time, lambda sample, _: f"sample {sample}", goal)
 
 
 def _read_parquet(file: Path, system: System, dt: float) -> Recording:
@@ -148,7 +159,7 @@ def _read_parquet(file: Path, system: System, dt: float) -> Recording:
         )
     except (TypeError, ValueError) as error:
         raise ValueError(f"has a column that is not of numbers ({error})") from None
-    return _from_table(table, system, lambda sample, _: f"sample {sample}")
+    return _from_table(table, columns, system, lambda sample, _: f"sample {sample}")
 
 
 def _chosen(header: Sequence[str], system: System) -> list[str]:
@@ -161,7 +172,14 @@ def _chosen(header: Sequence[str], system: System) -> list[str]:
             f"{', '.join(needed)}"
         )
     controls = [f"control_{i + 1}" for i in range(system.control_box.dimension)]
-    return needed + (controls if set(controls) <= set(header) else [])
+    goal = goal_columns(system.space)
+    there = set(header)
+    return [*needed, *(name for group in (controls, goal) if set(group) <= there for name in group)]
+
+
+def goal_columns(space: StateSpace) -> list[str]:
+    """Names of the columns of a goal: its lower corner, then its upper."""
+    return [f"goal_{end}_{name}" for end in ("lower", "upper") for name in space.names]
 
 
 def _shortened(names: Sequence[str]) -> str:
@@ -169,11 +187,23 @@ def _shortened(names: Sequence[str]) -> str:
     return ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
 
 
-def _from_table(table: Floats, system: System, place: Callable[[int, int], str]) -> Recording:
-    """A recording from columns time, states and perhaps controls."""
-    n = system.space.dimension
-    controls = table[:, n + 1 :] if table.shape[1] > n + 1 else None
-    return Recording(table[:, 1 : n + 1], _complete(controls, len(table)), table[:, 0], place)
+def _from_table(
+    table: Floats, columns: Sequence[str], system: System, place: Callable[[int, int], str]
+) -> Recording:
+    """A recording from columns time, states and perhaps controls and a goal."""
+    n, m = system.space.dimension, system.control_box.dimension
+    rest, goal = table[:, n + 1 :], None
+    if len(table) and columns[-1:] == goal_columns(system.space)[-1:]:
+        rest, goal = rest[:, : -2 * n], _box(rest[:1, -2 * n :].reshape(-1, n))
+    controls = rest if rest.shape[1] == m else None
+    return Recording(table[:, 1 : n + 1], _complete(controls, len(table)), table[:, 0], place, goal)
+
+
+def _box(corners: Floats) -> Box:
+    """A goal from its corners (2, n)."""
+    if corners.shape[0] != 2 or np.any(np.isnan(corners)) or np.any(corners[0] > corners[1]):
+        raise ValueError(f"has a goal that is no box: {corners.tolist()}")
+    return Box(*corners)
 
 
 def _complete(controls: Floats | None, samples: int) -> Floats | None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlci.demonstrations import REACHED, Demonstration, Task
-from mlci.recordings.formats import READERS, Recording
+from mlci.recordings.formats import READERS, Recording, goal_columns
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import System
 
@@ -50,7 +50,7 @@ def read_demonstrations(
         system: whose state space names the columns and bounds the states.
         dt: time step of files without a header [s].
         start: (n,) first state of every task; None takes each file's first sample.
-        goal: goal of every task; None takes each file's last sample.
+        goal: goal of every task; None takes what each file says, or else its last sample.
         tolerance: how far a path may begin from `start` or end from `goal`, Euclidean in raw
             units and by the nearest winding.
 
@@ -81,20 +81,22 @@ def read_demonstrations(
 def write_demonstration(path: str | Path, demonstration: Demonstration, space: StateSpace) -> None:
     """Write a CSV with a header, from which the same numbers are read back, bit by bit.
 
-    The task is not written: a reader takes start and goal off the ends.
+    The goal is in the line of the first sample. The start is not written: a reader takes the first
+    sample for it.
     """
-    controls = demonstration.controls
+    controls, goal = demonstration.controls, demonstration.task.goal
+    corners = [repr(value) for value in [*goal.lower.tolist(), *goal.upper.tolist()]]
     names = [] if controls is None else [f"control_{i + 1}" for i in range(controls.shape[1])]
     with Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["time", *space.names, *names])
+        writer.writerow(["time", *space.names, *names, *goal_columns(space)])
         for k, state in enumerate(demonstration.states):
             held = [""] * len(names)
             if controls is not None and k < len(controls):
                 held = [repr(value) for value in controls[k].tolist()]
-            writer.writerow(
-                [repr(k * demonstration.dt), *(repr(value) for value in state.tolist()), *held]
-            )
+            values = [k * demonstration.dt, *state.tolist()]
+            at_goal = corners if k == 0 else [""] * len(corners)
+            writer.writerow([*map(repr, values), *held, *at_goal])
 
 
 def _files(paths: Sequence[str | Path]) -> tuple[list[Path], list[Problem]]:
@@ -153,7 +155,7 @@ def _demonstration(
     first = states[0].copy() if start is None else np.asarray(start, dtype=float)
     away = space.difference(states[0], first)
     states = states - (states[0] - first - away)  # whole turns, exactly 0 for its own start
-    region = Box.point(states[-1]) if goal is None else goal
+    region = goal or recording.goal or Box.point(states[-1])
     for word, distance in (
         ("begins", np.linalg.norm(away)),
         ("ends", np.linalg.norm(space.excess(states[-1], region))),

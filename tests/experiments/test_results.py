@@ -6,6 +6,7 @@ import io
 import json
 import os
 import re
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -13,10 +14,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from tiny_point import computed, hopeless, planned
+from commands import run_here
+from tiny_point import TINY, composed, computed, hopeless, planned
 
-from experiments import results
+from experiments import infer, results
 from experiments.collate.join import collate
+from experiments.config.read import read_config
 from experiments.config.settings import Settings
 from experiments.tracking.figure_notes import figure_note, write_note
 from experiments.tracking.points import Point
@@ -152,7 +155,8 @@ def test_show_tells_config_record_and_results(settings: Settings, tmp_path: Path
     assert 0 < float(error) < 1
     assert row(out, "  final_state_error") == ["final_state_error", error]
     log = (points[0].folder / "log.txt").read_text().splitlines()
-    assert log[0].startswith("demonstrations  4 of 6 kept")
+    assert log[0].startswith("answer          ")
+    assert "demonstrations  4 of 6 kept" in "\n".join(log)
     assert out.splitlines()[-len(log) - 1 :] == ["log", *(f"  {line}" for line in log)]
     _, out, _ = look("show", "s")
     assert "s: 2 points: 2 done" in out
@@ -396,3 +400,52 @@ def test_status_tells_why_not(
         else:
             assert "not up to date: " in line
             assert told in line
+
+
+@pytest.mark.parametrize("inference", ["calibrated", "paper"])
+def test_infer_on_a_points_recorded_files_gives_its_ranking_back(
+    tmp_path: Path, look, inference: str
+) -> None:
+    """With goals that are ranges, which the ends of the paths do not tell."""
+    words = (f"inference={inference}", "tasks.goal=[0.6,null]")
+    point = computed(read_config(composed(*TINY, *words))[0], tmp_path)
+    folder = tmp_path / "recorded"
+    status, out, _ = look("demonstrations", point.identity[:8], "--out", str(folder))
+    assert status == 0
+    trials = pd.read_csv(point.folder / "trials.csv")["trial"]
+    assert f"{len(trials)} demonstrations into {folder}" in out
+    assert sorted(path.stem for path in folder.iterdir()) == [f"trial_{i:03d}" for i in trials]
+    model = ["system=double_integrator", "dt=0.5", "actions=3", "grid.shape=[12,8]"]
+    done = run_here(
+        infer.main, f"demonstrations={folder}", f"results={tmp_path}", *model, words[0],
+        folder=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    (written,) = (tmp_path / "inference").iterdir()
+    ranking, expected = (pd.read_csv(each / "hypotheses.csv") for each in (written, point.folder))
+    pd.testing.assert_frame_equal(ranking, expected[ranking.columns], rtol=1e-9)
+    assert ranking["gain"].max() > 0.1
+
+
+def test_demonstrations_that_are_not_there_are_told(
+    settings: Settings, tmp_path: Path, look
+) -> None:
+    point = finished(settings, tmp_path)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "a.csv").touch()
+    folder = str(tmp_path / "out")
+    for name, out, message in (
+        (planned(dataclasses.replace(settings, dt=0.1), tmp_path).identity, folder, "no such"),
+        (point.identity, str(tmp_path / "full"), "is not empty"),
+    ):
+        status, _, err = look("demonstrations", name, "--out", out)
+        assert status == 2
+        assert message in err
+    shutil.rmtree(tmp_path / "store" / "demonstrations")
+    status, _, err = look("demonstrations", point.identity, "--out", folder)
+    assert status == 2
+    assert "its stored demonstrations are gone; run it again" in err
+    (point.folder / "record.json").unlink()
+    status, _, err = look("demonstrations", point.identity, "--out", folder)
+    assert "has not finished" in err
+    assert not Path(folder).exists()

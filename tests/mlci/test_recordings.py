@@ -2,6 +2,7 @@ import builtins
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from mlci.demonstrations import Demonstration, Task
@@ -61,11 +62,55 @@ def test_csv_with_header_comes_back_bit_by_bit(tmp_path, swing):
     assert read.name == "swing"
     assert_same(read, swing)
     lines = (tmp_path / "swing.csv").read_text().splitlines()
-    assert lines[0] == "time,angle,angular_velocity,control_1"
+    assert lines[0] == (
+        "time,angle,angular_velocity,control_1,goal_lower_angle,goal_lower_angular_velocity,"
+        "goal_upper_angle,goal_upper_angular_velocity"
+    )
     assert len(lines) == 302
     bare = Demonstration(swing.task, swing.states, None, swing.dt)
     write_demonstration(tmp_path / "bare.csv", bare, PENDULUM.space)
     assert_same(read_one(tmp_path / "bare.csv"), swing, controls=False)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "npz", "parquet"])
+@pytest.mark.parametrize("controls", [True, False])
+def test_a_goal_comes_back_bit_by_bit(tmp_path, swing, suffix, controls):
+    """A range of angles a turn away, at any velocity; a goal that is given wins."""
+    end = swing.states[-1, 0]
+    goal = Box([end - 2 * np.pi - 1 / 3, -np.inf], [end - 2 * np.pi + 1e-3, np.inf])
+    task = Task(swing.states[0], goal, 3.0)
+    written = Demonstration(task, swing.states, swing.controls if controls else None, 0.01)
+    path = tmp_path / f"a.{suffix}"
+    write_demonstration(tmp_path / "a.csv", written, PENDULUM.space)
+    if suffix == "parquet":
+        pd.read_csv(tmp_path / "a.csv").to_parquet(path)
+    if suffix == "npz":
+        corners = {"goal_lower": goal.lower, "goal_upper": goal.upper}
+        held = {"controls": swing.controls} if controls else {}
+        np.savez(path, states=swing.states, dt=0.01, **held, **corners)
+    read = read_one(path)
+    exact = suffix != "parquet"  # pandas reads numbers to the last bit but one
+    assert np.allclose(read.states, swing.states, rtol=0 if exact else 1e-15, atol=0)
+    for side in ("lower", "upper"):
+        sides = getattr(read.task.goal, side), getattr(goal, side)
+        assert np.allclose(*sides, rtol=0 if exact else 1e-15, atol=0)
+    assert (read.controls is not None) == controls
+    other = Box([end - 0.1, -np.inf], [end, np.inf])
+    assert read_one(path, goal=other).task.goal is other
+
+
+def test_a_goal_that_is_none_is_named(tmp_path):
+    head = "time,angle,angular_velocity,goal_lower_angle,goal_lower_angular_velocity,"
+    head += "goal_upper_angle,goal_upper_angular_velocity\n"
+    path, rest = tmp_path / "a.csv", "0.1,1,0,,,,\n"
+    assert "ends 1 away from the goal" in problem_with(path, f"{head}0,1,0,2,-1,2,1\n{rest}")
+    for corners in ("2,-1,0,1", "0,,2,1", "0,oops,2,1"):
+        message = problem_with(path, f"{head}0,1,0,{corners}\n{rest}")
+        assert "a goal that is no box" in message
+    assert "has 0 sample(s)" in problem_with(path, head)
+    np.savez(tmp_path / "a.npz", states=np.ones((3, 2)), dt=1, goal_lower=[1], goal_upper=[1, 1])
+    _, (problem,) = read_demonstrations(tmp_path / "a.npz", PENDULUM)
+    assert "needs 'goal_lower' and 'goal_upper' of shape (2,)" in problem.message
 
 
 def test_lines_of_one_dimension_each(tmp_path, swing):

@@ -1,0 +1,59 @@
+"""A point's demonstrations as recorded files, such as somebody else's would be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from experiments.lookback.archive import ArchiveError, Facts
+from experiments.tracking.store import Store
+from mlci.demonstrations import Demonstration, Task
+from mlci.recordings.read import write_demonstration
+from mlci.spaces import Box, StateSpace
+
+
+def write_recordings(facts: Facts, folder: Path) -> list[Path]:
+    """Write a CSV of each demonstration of a finished point, with its goal; no number is rounded.
+
+    Args:
+        facts: the point.
+        folder: new or empty.
+
+    Returns:
+        The files.
+
+    Raises:
+        ArchiveError: the point has not finished, its stored demonstrations were removed, or the
+            folder holds something.
+    """
+    identity = facts.point.identity
+    if not facts.record:
+        raise ArchiveError(f"{identity}: has not finished; run it first")
+    store = Store(facts.point.results / "store")
+    trials = store.read("demonstrations", facts.record["stages"]["demonstrations"])
+    if trials is None:
+        raise ArchiveError(f"{identity}: its stored demonstrations are gone; run it again")
+    if folder.exists() and any(folder.iterdir()):
+        raise ArchiveError(f"{folder}: is not empty, and what it holds would be ranked as well")
+    folder.mkdir(parents=True, exist_ok=True)
+    space, dt = _space(facts), facts.config["demonstrations.dt"]
+    files = []
+    for number in pd.read_csv(facts.point.folder / "trials.csv")["trial"]:
+        goal = Box(trials["goal_lower"][number], trials["goal_upper"][number])
+        task = Task(trials["starts"][number], goal, facts.config["horizon"])
+        files.append(folder / f"trial_{number:03d}.csv")
+        write_demonstration(
+            files[-1],
+            Demonstration(task, trials["states"][number], trials["controls"][number], dt),
+            space,
+        )
+    return files
+
+
+def _space(facts: Facts) -> StateSpace:
+    """The state space of a point."""
+    rows = pd.read_csv(facts.point.folder / "dimensions.csv", keep_default_na=False)
+    bounds = Box(np.array(rows["lower"]), np.array(rows["upper"]))
+    return StateSpace(bounds, np.array(rows["periodic"]), tuple(rows["name"]), tuple(rows["unit"]))
