@@ -17,6 +17,7 @@ from mlci.spaces import Bools, Floats, Ints
 
 # Forecasts are counted between these probabilities of crossing.
 EDGES = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+BIN_COLUMNS = ("lower", "upper", "count", "forecast", "crossed", "low", "high")
 _RESAMPLES, _TAILS = 1000, (0.025, 0.975)  # of a 95 % interval
 
 
@@ -88,7 +89,7 @@ def score_forecasts(
                 "high": share.high,
             }
         )
-    bins = pd.DataFrame(rows)
+    bins = pd.DataFrame(rows, columns=list(BIN_COLUMNS))
     distance = (bins["forecast"] - bins["crossed"]).abs()
     return ForecastScores(
         _mean(log_scores, use, times),

@@ -208,7 +208,7 @@ def _fit_curve(
             jac=True,
             method="L-BFGS-B",
             bounds=bounds,
-            options={"ftol": 1e-14, "gtol": 1e-9, "maxiter": 1000},
+            options={"ftol": 1e-11, "gtol": 1e-7, "maxiter": 1000},
         )
         for ceiling in (1.0, 0.5)
     ]

@@ -241,15 +241,25 @@ def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Tr
     )
 
 
-def _skill(settings: Settings) -> dict[str, Any]:
-    """What `demonstrate` has to know of a demonstrator, beside tasks, truth and filter."""
-    demonstrator, reality = settings.demonstrations, settings.reality
+def nominal_skill(settings: Settings) -> dict[str, Any]:
+    """What `demonstrate` has to know of the demonstrator that inference knows of."""
+    demonstrator = settings.demonstrations
     return {
         "dt": demonstrator.dt,
         "goal_weight": demonstrator.goal_weight,
-        "iterations": reality.iterations or demonstrator.iterations,
+        "iterations": demonstrator.iterations,
         "goal_tolerance": demonstrator.goal_tolerance,
         "wind": demonstrator.wind,
         "limit": settings.model.control_box if demonstrator.clip else None,
-        "integrator": _INTEGRATORS[reality.integrator or demonstrator.integrator],
+        "integrator": _INTEGRATORS[demonstrator.integrator],
     }
+
+
+def _skill(settings: Settings) -> dict[str, Any]:
+    """The same of the demonstrators that there really are."""
+    skill, reality = nominal_skill(settings), settings.reality
+    if reality.iterations is not None:
+        skill["iterations"] = reality.iterations
+    if reality.integrator is not None:
+        skill["integrator"] = _INTEGRATORS[reality.integrator]
+    return skill

@@ -11,14 +11,15 @@ from tiny_point import composed
 
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
-from experiments.point import stages, trials
+from experiments.point import forecasts, stages, trials
 from experiments.tracking.trees import canonical_json, flatten, plain
 
 BASE = ["grid.shape=[6,5]", "safety.shape=[21,21]"]
 BOX = "[{lower: [3.2, 0.0], upper: [3.8, 1.2]}]"
-ALL = {"safe_set", "demonstrations", "mdp", "mdp_truth"}
-TRUTH, MODEL = {"safe_set", "demonstrations", "mdp_truth"}, {"mdp", "mdp_truth"}
-DEMONSTRATOR: set[str] = {"demonstrations"}
+ALL = {"safe_set", "demonstrations", "mdp", "mdp_truth", "forecasts"}
+TRUTH, MODEL = {"safe_set", "demonstrations", "mdp_truth"}, {"mdp", "mdp_truth", "forecasts"}
+REAL: set[str] = {"demonstrations"}
+DEMONSTRATOR, FORECASTS = REAL | {"forecasts"}, {"forecasts"}
 NOTHING: set[str] = set()
 # A change of each field, and the stages that are made anew by it.
 CHANGES = {
@@ -30,27 +31,27 @@ CHANGES = {
     "system.arguments.drag": ("system.drag=0.1", ALL),
     "system.arguments.mass": ("system.mass=2.0", ALL),
     "actions": ("actions=5", MODEL),
-    "hypotheses.shape": ("hypotheses.shape=[10,20]", {"mdp"}),
-    "hypotheses.boxes": (f"hypotheses.boxes={BOX}", {"mdp"}),
+    "hypotheses.shape": ("hypotheses.shape=[10,20]", {"mdp", "forecasts"}),
+    "hypotheses.boxes": (f"hypotheses.boxes={BOX}", {"mdp", "forecasts"}),
     "grid.shape": ("grid.shape=[6,7]", MODEL),
     "grid.offset": ("grid.offset=[0.5,0.0]", MODEL),
     "dt": ("dt=0.5", MODEL),
     "transition.samples": ("transition.samples=2", MODEL),
     "temperature": ("temperature=2.0", MODEL),
     "inference.prior": ("inference.prior=0.3", NOTHING),  # after all stages, as below
-    "inference.exact_ends": ("inference.exact_ends=false", NOTHING),
+    "inference.exact_ends": ("inference.exact_ends=false", FORECASTS),
     "inference.calibrate": ("inference.calibrate=false", NOTHING),
     "inference.model_error": ("inference.model_error=0.2", NOTHING),
     "inference.rule_breaking": ("inference.rule_breaking=0.2", NOTHING),
     "tasks.lower": ("tasks.lower=[null,-1.0]", DEMONSTRATOR),
     "tasks.upper": ("tasks.upper=[null,1.0]", DEMONSTRATOR),
     "tasks.goal": ("tasks.goal=[0.1,null]", DEMONSTRATOR),
-    "tasks.crossing": ("tasks.crossing=true", DEMONSTRATOR),
+    "tasks.crossing": ("tasks.crossing=true", REAL),
     "truth.name": ("truth.name=another", NOTHING),  # a word in tables
     "truth.boxes": ("truth.boxes=[{lower: [3.1, 0.0], upper: [3.9, 1.2]}]", TRUTH),
     "truth.cell": ("truth=cell truth.cell=37", TRUTH),
     "horizon": ("horizon=4.0", DEMONSTRATOR),
-    "demonstrations.pairs": ("demonstrations.pairs=90", DEMONSTRATOR),
+    "demonstrations.pairs": ("demonstrations.pairs=90", REAL),
     "demonstrations.keep": ("demonstrations.keep=60", NOTHING),  # of those that are stored
     "demonstrations.dt": ("demonstrations.dt=0.02", DEMONSTRATOR),
     "demonstrations.goal_tolerance": ("demonstrations.goal_tolerance=0.1", DEMONSTRATOR),
@@ -61,24 +62,24 @@ CHANGES = {
     "demonstrations.clip": ("demonstrations.clip=true", DEMONSTRATOR),
     "demonstrations.integrator": ("demonstrations.integrator=rk4", DEMONSTRATOR),
     "demonstrations.wind": ("demonstrations.wind=false", DEMONSTRATOR),
-    "demonstrations.rule_breaking": ("demonstrations.rule_breaking=0.1", DEMONSTRATOR),
+    "demonstrations.rule_breaking": ("demonstrations.rule_breaking=0.1", REAL),
     "reality.system": ("reality.system={length: 2.0}", {"safe_set", "demonstrations"}),
-    "reality.effort": ("reality.effort=[0.0,1.0,0.0]", DEMONSTRATOR),
-    "reality.iterations": ("reality.iterations=2", DEMONSTRATOR),
-    "reality.integrator": ("reality.integrator=rk4", DEMONSTRATOR),
-    "reality.control_noise": ("reality.control_noise=[0.1]", DEMONSTRATOR),
-    "reality.sensor_noise": ("reality.sensor_noise=[0.1,0.1]", DEMONSTRATOR),
+    "reality.effort": ("reality.effort=[0.0,1.0,0.0]", REAL),
+    "reality.iterations": ("reality.iterations=2", REAL),
+    "reality.integrator": ("reality.integrator=rk4", REAL),
+    "reality.control_noise": ("reality.control_noise=[0.1]", REAL),
+    "reality.sensor_noise": ("reality.sensor_noise=[0.1,0.1]", REAL),
     "safety.method": ("safety.method=escapes", {"safe_set", "demonstrations"}),
     "safety.shape": ("safety.shape=[23,21]", {"safe_set", "demonstrations"}),
-    "safety.margin": ("safety.margin=0.1", DEMONSTRATOR),
-    "safety.width": ("safety.width=0.1", DEMONSTRATOR),
+    "safety.margin": ("safety.margin=0.1", REAL),
+    "safety.width": ("safety.width=0.1", REAL),
     "ranks.demonstrations": ("ranks.demonstrations=10", NOTHING),  # after all stages, as below
     "ranks.subsets": ("ranks.subsets=10", NOTHING),
     "ranks.top": ("ranks.top=3", NOTHING),
     "calibration.sets": ("truth=none calibration.sets=3", TRUTH),  # with another truth, see there
     "calibration.demonstrations": ("calibration.demonstrations=[1]", NOTHING),
     "rollouts": ("rollouts=3", NOTHING),
-    "seed": ("seed=1", DEMONSTRATOR),
+    "seed": ("seed=1", REAL),
 }
 
 
@@ -94,6 +95,7 @@ def keys(settings: Settings) -> dict[str, bytes]:
         "demonstrations": canonical_json(trials.demonstration_inputs(settings, safe_set.hex())),
         "mdp": canonical_json(stages.model_inputs(settings, settings.candidates)),
         "mdp_truth": canonical_json(stages.model_inputs(settings, settings.constraint)),
+        "forecasts": canonical_json(plain(forecasts.forecast_inputs(settings))),
     }
 
 

@@ -1,0 +1,151 @@
+"""How often the tabular model's forecasts come true, kept in the store.
+
+The demonstrator that inference knows of, whatever real ones are like, does tasks from the study's
+box without a constraint. So all truths, seeds and realities of a study share what it shows.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+import mlci.calibration
+import mlci.demonstrator
+from experiments.config.settings import Settings
+from experiments.point.stages import model_inputs, system_module, tabular_model
+from experiments.point.trials import nominal_skill
+from experiments.tracking.store import Store
+from mlci.calibration import Calibration, calibrate_on
+from mlci.demonstrator import Outcome, demonstrate, sample_trials
+from mlci.forecast_scores import BIN_COLUMNS, ForecastScores, Score
+from mlci.forecasts import ForecastCurve, ForecastMap
+
+TRIALS = 200
+SEED = 1 << 32  # one more than a study can have: none of its tasks is among these
+_JUDGED = ("before", "after")
+
+
+def forecast_inputs(settings: Settings) -> tuple[Any, ...]:
+    """All that the calibration depends on, beside code."""
+    return (
+        model_inputs(settings, settings.candidates),
+        replace(settings.demonstrations, pairs=TRIALS, keep=TRIALS, rule_breaking=0.0),
+        replace(settings.tasks, crossing=False),
+        settings.horizon,
+        settings.inference.exact_ends,
+    )
+
+
+def forecast_calibration(settings: Settings, store: Store) -> Calibration:
+    """The map of forecasts and their scores, from the store or computed."""
+
+    def compute() -> dict[str, np.ndarray]:
+        system, demonstrator = settings.model, settings.demonstrations
+        trials = sample_trials(
+            system,
+            None,
+            settings.tasks.start_box(system.space),
+            trials=TRIALS,
+            seed=SEED,
+            horizon=settings.horizon,
+            dt=demonstrator.dt,
+            goal_offsets=settings.tasks.goal_offsets,
+            restarts=demonstrator.restarts,
+            hold=demonstrator.hold,
+        )
+        attempts = demonstrate(system, trials, None, None, **nominal_skill(settings))
+        model = tabular_model(settings, store)
+        calibration = calibrate_on(
+            model,
+            [each.demonstration for each in attempts if each.outcome is Outcome.KEPT],
+            tried=TRIALS,
+            hypotheses=model.regions.mask(settings.candidates.names),
+            exact_ends=settings.inference.exact_ends,
+        )
+        return _arrays(calibration)
+
+    modules = [
+        mlci.calibration,
+        mlci.demonstrator,
+        system_module(settings.model),
+        sys.modules[__name__],
+    ]
+    return _calibration(store.get("forecasts", forecast_inputs(settings), modules, compute))
+
+
+def forecast_table(calibration: Calibration) -> pd.DataFrame:
+    """A row a bin of forecasts for tasks that the map was not fitted on.
+
+    `map` is 0 for Phi itself and 1 for calibrated forecasts; beside the columns of
+    `ForecastScores.bins` there are the scores of all bins together.
+    """
+    tables = [pd.DataFrame(columns=["map", *BIN_COLUMNS, *_SCORES])]
+    for number, scores in enumerate((calibration.before, calibration.after)):
+        if scores is not None:
+            of_all = dict(zip(_SCORES, _score_row(scores), strict=True))
+            tables.append(scores.bins.assign(**of_all)[[*BIN_COLUMNS, *_SCORES]])
+            tables[-1].insert(0, "map", number)
+    return pd.concat(tables[1:] or tables, ignore_index=True)
+
+
+_SCORES = (
+    *(f"log_score{end}" for end in ("", "_low", "_high")),
+    *(f"brier{end}" for end in ("", "_low", "_high")),
+    "off_by",
+)
+
+
+def _score_row(scores: ForecastScores) -> list[float]:
+    """The scores of all bins together."""
+    log_score, brier = (dataclasses.astuple(each) for each in (scores.log_score, scores.brier))
+    return [*log_score, *brier, scores.off_by]
+
+
+def _arrays(calibration: Calibration) -> dict[str, np.ndarray]:
+    """A calibration as arrays, for the store."""
+    arrays = {"tasks": np.array([calibration.tried, calibration.used])}
+    if calibration.out_of_reach is not None:
+        arrays["out_of_reach"] = np.array(calibration.out_of_reach)
+    if calibration.map is not None:
+        arrays["curves"] = np.array(
+            [[*curve.sizes, *dataclasses.astuple(curve)[1:]] for curve in calibration.map.curves]
+        )
+    for name in _JUDGED:
+        scores = getattr(calibration, name)
+        if scores is not None:
+            arrays[f"{name}_bins"] = scores.bins[list(BIN_COLUMNS)].to_numpy(dtype=float)
+            arrays[f"{name}_scores"] = np.array(_score_row(scores))
+    return arrays
+
+
+def _calibration(arrays: Mapping[str, np.ndarray]) -> Calibration:
+    """The calibration that some arrays hold."""
+    curves = [
+        ForecastCurve((row[0], row[1]), int(row[2]), int(row[3]), *row[4:])
+        for row in arrays.get("curves", np.empty((0, 8))).tolist()
+    ]
+    out_of_reach = arrays.get("out_of_reach")
+    before, after = (_scores(arrays, name) for name in _JUDGED)
+    return Calibration(
+        tried=int(arrays["tasks"][0]),
+        used=int(arrays["tasks"][1]),
+        map=ForecastMap(tuple(curves)) if curves else None,
+        before=before,
+        after=after,
+        out_of_reach=None if out_of_reach is None else float(out_of_reach),
+    )
+
+
+def _scores(arrays: Mapping[str, np.ndarray], name: str) -> ForecastScores | None:
+    """The scores of some name that some arrays hold, if they do."""
+    if f"{name}_bins" not in arrays:
+        return None
+    row = arrays[f"{name}_scores"].tolist()
+    bins = pd.DataFrame(arrays[f"{name}_bins"], columns=list(BIN_COLUMNS)).astype({"count": int})
+    return ForecastScores(Score(*row[:3]), Score(*row[3:6]), row[6], bins)

@@ -1,0 +1,104 @@
+"""The stage of forecasts: what it shares, what it stores, and its table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_point import TINY, composed
+
+from experiments.config.read import read_config
+from experiments.config.settings import Settings
+from experiments.point import forecasts
+from experiments.point.forecasts import forecast_calibration, forecast_table
+from experiments.tracking.store import Store
+from mlci.calibration import Calibration, calibrate_on
+from mlci.demonstrator import Outcome, demonstrate, sample_trials
+from mlci.simulate import EULER
+from mlci.tabular import action_grid, discretize
+
+
+def settings_of(*words: str) -> Settings:
+    return read_config(composed(*TINY, *words))[0]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("store")
+
+
+@pytest.fixture(scope="module")
+def calibration(folder: Path) -> Calibration:
+    return forecast_calibration(settings_of(), Store(folder))
+
+
+def test_it_is_that_of_the_library(calibration: Calibration) -> None:
+    """With the demonstrator of the settings, whom nothing constrains, and a model without truth."""
+    settings = settings_of()
+    system = settings.model
+    trials = sample_trials(
+        system,
+        None,
+        settings.tasks.start_box(system.space),
+        trials=200,
+        seed=1 << 32,
+        horizon=2.0,
+        dt=0.05,
+        restarts=1,
+        hold=0.5,
+    )
+    attempts = demonstrate(system, trials, None, None, dt=0.05, integrator=EULER)
+    paths = [each.demonstration for each in attempts if each.outcome is Outcome.KEPT]
+    actions = action_grid(system, settings.action_counts)
+    model = discretize(system, settings.cells, actions, 0.5, settings.candidates)
+    expected = calibrate_on(model, paths, tried=200)
+    assert (calibration.tried, calibration.used) == (200, expected.used)
+    assert calibration.map == expected.map
+    assert expected.after is not None
+    assert calibration.after is not None
+    assert calibration.after.brier == expected.after.brier
+    assert calibration.after.bins.equals(expected.after.bins)
+    assert calibration.out_of_reach == expected.out_of_reach
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "truth.boxes=[{lower: [1.0, null], upper: [2.0, null]}]",
+        "seed=3",
+        "demonstrations.keep=2",
+        "reality.iterations=2",
+    ],
+)
+def test_what_does_not_matter_is_shared(words: str, calibration: Calibration, folder: Path) -> None:
+    store = Store(folder)
+    entries = set(folder.glob("forecasts/*.npz"))
+    again = forecast_calibration(settings_of(words), store)
+    assert again.map == calibration.map
+    assert set(folder.glob("forecasts/*.npz")) == entries
+
+
+def test_too_few_demonstrations_are_stored_as_no_map(folder: Path) -> None:
+    strict = settings_of("demonstrations.goal_tolerance=1e-12")
+    for _ in range(2):  # computed, then read
+        calibration = forecast_calibration(strict, Store(folder))
+        assert calibration.map is None
+        assert calibration.tried == 200
+        assert forecast_table(calibration).empty
+
+
+def test_the_table_has_both_forecasts(calibration: Calibration) -> None:
+    table = forecast_table(calibration)
+    assert calibration.before is not None
+    assert calibration.after is not None
+    for number, scores in ((0, calibration.before), (1, calibration.after)):
+        rows = table[table["map"] == number]
+        assert np.array_equal(rows["forecast"], scores.bins["forecast"])
+        assert set(rows["brier_low"]) == {scores.brier.low}
+        assert set(rows["off_by"]) == {scores.off_by}
+
+
+def test_trials_are_none_of_the_studys() -> None:
+    """A seed of settings is below 2^32."""
+    assert forecasts.SEED == 2**32
