@@ -21,7 +21,7 @@ import mlci.preparation
 from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, read_recorded_config
-from experiments.config.settings import RecordedSettings
+from experiments.config.settings import ESTIMATE, RecordedSettings
 from experiments.console import answer_lines, diagnosis_lines, entry
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.truth_tables import dimension_table
@@ -63,10 +63,12 @@ def infer(settings: RecordedSettings) -> int:
         model,
         demonstrations,
         prior_none=settings.inference.prior,
-        rates=settings.inference.rates,
+        rates=settings.inference.rates(calibrated=False),
         exact_ends=settings.inference.exact_ends,
         round_horizon=settings.round_horizon,
     )
+    if settings.inference.rule_breaking == ESTIMATE:
+        inference = inference.with_rule_breaking()
     ranking = ranking_table(inference)
     result = answer(
         model,

@@ -53,11 +53,13 @@ class Answer:
     def assumptions(self) -> list[str]:
         """What the answer takes for granted, a phrase each."""
         inference = self.inference
+        breaking = inference.rule_breaking
+        of_rules = f"{inference.rates.rule_breaking:g}" if breaking is None else f"{breaking}"
         return [
             "at most one region is forbidden",
             f"prior of none {inference.prior_none:g}, the rest shared equally",
             f"model error {inference.rates.model_error:g}",
-            f"rule breaking {inference.rates.rule_breaking:g}",
+            f"rule breaking {of_rules}",
             f"temperature {self.temperature:g}",
             f"paths begin and end at {'states' if self.exact_ends else 'cells'}",
         ]

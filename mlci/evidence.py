@@ -192,12 +192,7 @@ def posterior(
         ValueError: a prior outside its range.
     """
     gain = np.asarray(gain, dtype=float)
-    weights = np.ones(gain.shape) if prior is None else np.asarray(prior, dtype=float)
-    if not 0 < prior_none <= 1:
-        raise ValueError(f"the prior of no constraint must lie in (0, 1], not {prior_none}")
-    if weights.shape != gain.shape or np.any(weights < 0) or not np.sum(weights) > 0:
-        raise ValueError(f"the prior needs {gain.shape} weights >= 0 that are not all 0")
-    share = (1 - prior_none) * weights / np.sum(weights)
+    share = prior_shares(len(gain), prior_none, prior)
     certain = (gain == np.inf) & (share > 0)
     if np.any(certain):
         return np.where(certain, share, 0.0) / np.sum(share[certain]), 0.0
@@ -205,6 +200,20 @@ def posterior(
         log_weight = np.append(np.log(share) + gain, np.log(prior_none))
     probability = np.exp(log_weight - logsumexp(log_weight))
     return probability[:-1], float(probability[-1])
+
+
+def prior_shares(count: int, prior_none: float, prior: ArrayLike | None = None) -> Floats:
+    """pi_i (C,), the prior probabilities of `count` hypotheses; arguments as of `posterior`.
+
+    Raises:
+        ValueError: a prior outside its range.
+    """
+    weights = np.ones(count) if prior is None else np.asarray(prior, dtype=float)
+    if not 0 < prior_none <= 1:
+        raise ValueError(f"the prior of no constraint must lie in (0, 1], not {prior_none}")
+    if weights.shape != (count,) or np.any(weights < 0) or not np.sum(weights) > 0:
+        raise ValueError(f"the prior needs ({count},) weights >= 0 that are not all 0")
+    return (1 - prior_none) * weights / np.sum(weights)
 
 
 def confidence(prior: float, avoidance: ArrayLike) -> float:

@@ -10,11 +10,12 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mlci.evidence import PAPER, Ranking, Rates, log_evidence, rank_constraints
+from mlci.forecasts import ForecastMap, is_possible, region_sizes
 from mlci.regions import Regions
+from mlci.rule_breaking import RateEstimate, estimate_rule_breaking
 from mlci.spaces import Bools, Floats, Ints
 
 _ROWS_OF_REPR, _ROWS_OF_SUMMARY = 5, 10
-_ROUNDED = 1e-12  # what sums of probabilities are off by
 
 # What became of a hypothesis, see `Inference.outcomes`.
 FEASIBLE, VIOLATED, UNAVOIDABLE, UNREACHABLE = "feasible", "violated", "unavoidable", "unreachable"
@@ -34,6 +35,9 @@ class Inference:
         reachable: (N,) whether the tabular model can do the task.
         prior_none: prior probability that there is no constraint.
         rates: model error and rule breaking of the demonstrators.
+        calibration: what maps alpha to what simulated demonstrators do; None leaves it as it is.
+        rule_breaking: the rate of rule breaking with its interval, where it is estimated from these
+            demonstrations, see `with_rule_breaking`.
         decided_by_cell: (N, C) pairs that are no evidence, since a hypothesis is certain to be
             entered only because of the cell in which the task starts or ends; none by default. See
             `mlci.evidence.decided_by_cell`.
@@ -49,6 +53,8 @@ class Inference:
     reachable: Bools
     prior_none: float = 0.5
     rates: Rates = PAPER
+    calibration: ForecastMap | None = None
+    rule_breaking: RateEstimate | None = None
     decided_by_cell: Bools = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
 
     def __post_init__(self) -> None:
@@ -75,8 +81,20 @@ class Inference:
 
     @cached_property
     def forecast(self) -> Floats:
-        """(N, C) probability of avoiding, as it counts for evidence: 1 where a cell decides."""
-        return np.where(self.decided_by_cell, 1.0, self.avoidance)
+        """(N, C) probability of avoiding, as it counts for evidence: calibrated, if it can be, and
+        1 where a cell decides."""
+        alpha = self.avoidance
+        if self.calibration is not None:
+            alpha = self.calibration.avoidance(alpha, region_sizes(self.hypotheses))
+        return np.where(self.decided_by_cell, 1.0, alpha)
+
+    def with_rule_breaking(self) -> Inference:
+        """The same with the rate of rule breaking that makes the demonstrations most likely."""
+        estimate = estimate_rule_breaking(
+            self.forecast, self.violated, self.rates.model_error, self.prior_none
+        )
+        rates = replace(self.rates, rule_breaking=estimate.rate)
+        return replace(self, rates=rates, rule_breaking=estimate)
 
     @cached_property
     def evidence(self) -> Floats:
@@ -95,7 +113,7 @@ class Inference:
         cases = [
             (VIOLATED, np.any(self.violated, axis=0)),
             (UNAVOIDABLE, self.gain == np.inf),
-            (UNREACHABLE, np.all(self.phi < _ROUNDED, axis=0)),
+            (UNREACHABLE, ~np.any(is_possible(self.avoidance), axis=0)),
         ]
         return np.select([case for _, case in cases], [name for name, _ in cases], FEASIBLE)
 
@@ -120,9 +138,12 @@ class Inference:
         return self.ranking.posterior_none
 
     def of(self, demonstrations: ArrayLike | slice) -> Inference:
-        """The inference from some of the demonstrations, by their numbers."""
+        """The inference from some of the demonstrations, by their numbers.
+
+        A rate of rule breaking that is estimated is so from these alone.
+        """
         part = demonstrations if isinstance(demonstrations, slice) else np.asarray(demonstrations)
-        return replace(
+        some = replace(
             self,
             names=tuple(np.array(self.names, dtype=object)[part]),
             avoidance=self.avoidance[part],
@@ -130,6 +151,7 @@ class Inference:
             reachable=self.reachable[part],
             decided_by_cell=self.decided_by_cell[part],
         )
+        return some if self.rule_breaking is None else some.with_rule_breaking()
 
     @property
     def warnings(self) -> list[str]:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from mlci.demonstrations import REACHED, Demonstration, Task, departures
 from mlci.evidence import DEFAULT_MODEL_ERROR, Rates, decided_by_cell
+from mlci.forecasts import ForecastMap
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions, as_mask
@@ -72,6 +73,7 @@ class PreparedInference:
         names: Sequence[str] = (),
         prior_none: float = 0.5,
         rates: Rates | None = None,
+        calibration: ForecastMap | None = None,
         tolerance: float = REACHED,
     ) -> Inference:
         """Rank the hypotheses by the demonstrations that have arrived, equations (4) to (6).
@@ -83,8 +85,8 @@ class PreparedInference:
                 done; by default each task was done once, in order.
             names: of the demonstrations; their numbers by default.
             prior_none: prior probability that there is no constraint.
-            rates: model error and rule breaking of the demonstrators; None takes the default
-                model error, and no rule breaking.
+            rates: as of `infer`.
+            calibration: as of `infer`.
             tolerance: how far a path may start from its task's start and end from its goal,
                 Euclidean in raw units.
 
@@ -108,6 +110,7 @@ class PreparedInference:
             self._path(path, float(step), number, name, tolerance)
             for path, step, number, name in zip(paths, steps, numbers.tolist(), labels, strict=True)
         ]
+        default = Rates(DEFAULT_MODEL_ERROR if calibration is None else 0.0)
         return Inference(
             self.hypotheses,
             labels,
@@ -115,8 +118,9 @@ class PreparedInference:
             _violations(self.hypotheses, paths),
             self.reachable[numbers],
             prior_none,
-            Rates(DEFAULT_MODEL_ERROR) if rates is None else rates,
-            self.decided_by_cell[numbers],
+            default if rates is None else rates,
+            calibration,
+            decided_by_cell=self.decided_by_cell[numbers],
         )
 
     def _path(self, path: ArrayLike, dt: float, number: int, name: str, tolerance: float) -> Floats:
@@ -141,6 +145,7 @@ def infer(
     hypotheses: ArrayLike | None = None,
     prior_none: float = 0.5,
     rates: Rates | None = None,
+    calibration: ForecastMap | None = None,
     round_horizon: bool = False,
     exact_ends: bool = True,
     tolerance: float = REACHED,
@@ -154,8 +159,10 @@ def infer(
         demonstrations: N demonstrations, each with a task of its own.
         hypotheses: (C,) mask over the model's regions; None takes all.
         prior_none: prior probability that there is no constraint.
-        rates: model error and rule breaking of the demonstrators; None takes the default model
-            error, and no rule breaking.
+        rates: model error and rule breaking of the demonstrators; None takes no rule breaking, and
+            the default model error, or none with a calibration.
+        calibration: what maps probabilities of the model to what simulated demonstrators do; see
+            `mlci.calibration.calibrate`.
         round_horizon: take the nearest number of time steps where dt does not divide a duration.
         exact_ends: let trajectories begin and end at states, so that a region is not certain to be
             entered only because it holds a cell's centre. The paper's begin and end at cells.
@@ -186,6 +193,7 @@ def infer(
         names=names,
         prior_none=prior_none,
         rates=rates,
+        calibration=calibration,
         tolerance=tolerance,
     )
 

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from experiments.config.settings import SystemSettings, system_class
-from experiments.config.settings.kinds import LIST, ONE
+from experiments.config.settings.kinds import LIST, ONE, WORD
 from experiments.config.suggestions import did_you_mean
 
 T = typing.TypeVar("T")
@@ -65,7 +65,7 @@ def field_keys(kind: Any, prefix: str = "") -> list[str]:
 def _lines(error: ValidationError, kind: Any, tree: Mapping[str, Any]) -> Iterator[str]:
     """A line for each of the errors."""
     for each in error.errors(include_url=False):
-        place = [part for part in each["loc"] if part not in (ONE, LIST)]
+        place = [part for part in each["loc"] if part not in (ONE, LIST, WORD)]
         key = _dotted(place) or "config"
         if each["type"] == "too_short" and each["input"]:
             continue  # entries that are wrong do not count, and have lines of their own

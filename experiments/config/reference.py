@@ -129,6 +129,8 @@ def _values(field: dict[str, Any], tree: dict[str, Any]) -> str:
     node = _resolved(field, tree)
     if choices := node.get("enum"):
         return " or ".join(f"`{choice}`" for choice in choices)
+    if "const" in node:
+        return f"`{node['const']}`"
     if several := node.get("anyOf") or node.get("oneOf"):
         each = [_values(one, tree) for one in several if "pattern" not in one]
         return " or ".join(dict.fromkeys(each))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.config.settings import Settings
+from experiments.config.settings import ESTIMATE, Settings
 from experiments.point.stages import tabular_model
 from experiments.point.trials import TrialSet, demonstrations
 from experiments.tracking.store import Store
@@ -73,10 +73,12 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         paths,
         hypotheses=hypotheses,
         prior_none=settings.inference.prior,
-        rates=settings.inference.rates,
+        rates=settings.inference.rates(calibrated=False),
         exact_ends=settings.inference.exact_ends,
         tolerance=np.inf,  # the demonstrator has decided which ends are near enough to the goal
     )
+    if settings.inference.rule_breaking == ESTIMATE:
+        inference = inference.with_rule_breaking()
     return PointInference(
         trials=trials,
         numbers=numbers,

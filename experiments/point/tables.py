@@ -18,6 +18,7 @@ from experiments.point.trajectory_tables import (
 )
 from experiments.point.truth_tables import TRUTH_TABLES, truth_tables
 from experiments.tracking.files import csv_bytes
+from mlci.inference import Inference
 from mlci.spaces import Floats
 
 PAPER_SIZE = 9  # demonstrations after which the paper looks at the rank
@@ -115,6 +116,7 @@ def _summary_table(
         "violation_distance_pooled": _mean(measures.violation_share[feasible]),
         f"rank_after_{PAPER_SIZE}": after["rank"].median(),
         f"share_top_{top}_after_{PAPER_SIZE}": after[f"share_top_{top}"].mean(),
+        **_rule_breaking(point.inference),
         "stay": diagnosis.stay,
         "leave": diagnosis.leave,
         "cells_crossed": diagnosis.cells_crossed,
@@ -124,6 +126,16 @@ def _summary_table(
         },
     }
     return pd.DataFrame([row])
+
+
+def _rule_breaking(inference: Inference) -> dict[str, float]:
+    """The rate of rule breaking, with its interval where it is estimated."""
+    estimate = inference.rule_breaking
+    return {
+        "rule_breaking_rate": inference.rates.rule_breaking,
+        "rule_breaking_lower": np.nan if estimate is None else estimate.lower,
+        "rule_breaking_upper": np.nan if estimate is None else estimate.upper,
+    }
 
 
 def _mean(values: Floats) -> float:

@@ -1,6 +1,7 @@
 """Every value of a config, in frozen dataclasses: its type, range, meaning and unit."""
 
 from experiments.config.settings.advice import AdviceSettings
+from experiments.config.settings.kinds import ESTIMATE
 from experiments.config.settings.parts import (
     NO_TRUTH,
     CalibrationSettings,
@@ -22,6 +23,7 @@ from experiments.config.settings.study import RunSettings, StudySettings, SweepS
 from experiments.config.settings.system import SystemSettings, system_class
 
 __all__ = [
+    "ESTIMATE",
     "NO_TRUTH",
     "AdviceSettings",
     "CalibrationSettings",

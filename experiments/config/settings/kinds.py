@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic.fields import FieldInfo
@@ -67,4 +67,10 @@ def one_or_list(one: Any, several: Any) -> Any:
 
 
 # They come into the place of an error, where they are no key.
-ONE, LIST = "<one>", "<list>"
+ONE, LIST, WORD = "<one>", "<list>", "<word>"
+
+ESTIMATE = "estimate"  # in place of a share
+ShareOrEstimate = Annotated[
+    Annotated[Share, Tag(ONE)] | Annotated[Literal["estimate"], Tag(WORD)],
+    Discriminator(lambda value: WORD if value == ESTIMATE else ONE),
+]

@@ -19,6 +19,7 @@ from experiments.config.settings.kinds import (
     Positive,
     Probability,
     Share,
+    ShareOrEstimate,
     Word,
     about,
 )
@@ -226,12 +227,18 @@ class InferenceSettings:
     model_error: Annotated[
         Share, about("share of demonstrations that say nothing by what they avoid")
     ]
-    rule_breaking: Annotated[Share, about("share of demonstrations that ignore the constraint")]
+    rule_breaking: Annotated[
+        ShareOrEstimate,
+        about(
+            "share of demonstrations that ignore the constraint; `estimate` takes the one that "
+            "makes them most likely"
+        ),
+    ]
 
-    @property
-    def rates(self) -> Rates:
-        """The rates, where probabilities are not calibrated."""
-        return Rates(self.model_error, self.rule_breaking)
+    def rates(self, *, calibrated: bool) -> Rates:
+        """The rates; that of rule breaking is 0 where it is still to be estimated."""
+        breaking = self.rule_breaking if isinstance(self.rule_breaking, float) else 0.0
+        return Rates(0.0 if calibrated else self.model_error, breaking)
 
 
 @dataclass(frozen=True, config=STRICT)

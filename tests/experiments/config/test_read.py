@@ -145,6 +145,8 @@ WRONG = [
     ("~dt", "dt: missing; give it a value"),
     ("dt=0.2,0.25", "dt: several values need -m, for a sweep, or dt=[0.2,0.25], for a list"),
     ("dt=0", "dt: 0.0 must be above 0"),
+    ("inference.rule_breaking=1", "inference.rule_breaking: 1.0 must be below 1"),
+    ("inference.rule_breaking=guess", "inference.rule_breaking: 'guess' is not a finite number"),
     ("dt=0.3", "dt: 0.3 does not cut the horizon 5.0 into whole steps; try 0.25 or 0.3125"),
     ("dt=7", "dt: 7.0 does not cut the horizon 5.0 into whole steps; try 5"),
     ("dt=1e-300", "dt: 1e-300 cuts the horizon 5.0 into more than 100000 steps"),

@@ -25,6 +25,12 @@ def test_settings_reach_the_inference(settings: Settings, tmp_path: Path) -> Non
     assert [name for name, true in zip(point.model.regions.names, point.truth, strict=True) if true]
     assert not np.any(point.truth & point.hypotheses)
     assert np.all(point.truth | point.hypotheses)
+    guess = dataclasses.replace(settings.inference, rule_breaking="estimate")
+    guessed = infer_point(dataclasses.replace(settings, inference=guess), Store(tmp_path)).inference
+    assert guessed.rule_breaking is not None
+    assert guessed.rates.rule_breaking == guessed.rule_breaking.rate
+    assert guessed.of([0]).rule_breaking == guessed.of([0]).with_rule_breaking().rule_breaking
+    assert guessed.of([0]).rule_breaking != guessed.rule_breaking
     again, exact = (
         infer(point.model, point.demonstrations, hypotheses=point.hypotheses, exact_ends=ends)
         for ends in (False, True)
