@@ -23,10 +23,12 @@ from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, read_recorded_config
 from experiments.config.settings import ESTIMATE, RecordedSettings
 from experiments.console import answer_lines, diagnosis_lines, entry
+from experiments.point.forecasts import recorded_calibration
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.truth_tables import dimension_table
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, replace_file
+from experiments.tracking.store import Store
 from experiments.tracking.trees import canonical_json, plain
 from mlci.answers import Answer, answer
 from mlci.demonstrations import Demonstration
@@ -59,11 +61,17 @@ def infer(settings: RecordedSettings) -> int:
     if not demonstrations:
         raise ConfigError("demonstrations: no file could be used; see above")
     model = _tabular_model(settings)
+    calibration = None
+    if settings.inference.calibrate:
+        store = Store(results_folder(settings) / "store")
+        calibration = recorded_calibration(settings, model, demonstrations, store)
+    forecast_map = None if calibration is None else calibration.map
     inference = mlci.preparation.infer(
         model,
         demonstrations,
         prior_none=settings.inference.prior,
-        rates=settings.inference.rates(calibrated=False),
+        rates=settings.inference.rates(calibrated=forecast_map is not None),
+        calibration=forecast_map,
         exact_ends=settings.inference.exact_ends,
         round_horizon=settings.round_horizon,
     )
@@ -79,6 +87,9 @@ def infer(settings: RecordedSettings) -> int:
     )
     for line in answer_lines(result, settings.top):
         print(line)
+    if calibration is not None:
+        for line in entry("calibration", calibration.summary()):
+            print(line)
     print(f"demonstrations  {len(demonstrations)} used, {len(problems)} files not used")
     for line in _refutation_lines(inference):
         print(line)

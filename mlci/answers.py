@@ -58,7 +58,9 @@ class Answer:
         return [
             "at most one region is forbidden",
             f"prior of none {inference.prior_none:g}, the rest shared equally",
-            f"model error {inference.rates.model_error:g}",
+            f"model error {inference.rates.model_error:g}"
+            if inference.calibration is None
+            else "evidence calibrated as if people moved like the simulated demonstrator",
             f"rule breaking {of_rules}",
             f"temperature {self.temperature:g}",
             f"paths begin and end at {'states' if self.exact_ends else 'cells'}",

@@ -30,6 +30,7 @@ TINY = (
     "ranks.demonstrations=2",
     "ranks.subsets=3",
     "rollouts=1",
+    "inference.calibrate=false",
 )
 
 

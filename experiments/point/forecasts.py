@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,14 +17,16 @@ import pandas as pd
 
 import mlci.calibration
 import mlci.demonstrator
-from experiments.config.settings import Settings
+from experiments.config.settings import RecordedSettings, Settings
 from experiments.point.stages import model_inputs, system_module, tabular_model
 from experiments.point.trials import nominal_skill
 from experiments.tracking.store import Store
-from mlci.calibration import Calibration, calibrate_on
+from mlci.calibration import Calibration, calibrate, calibrate_on
+from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.forecast_scores import BIN_COLUMNS, ForecastScores, Score
 from mlci.forecasts import ForecastCurve, ForecastMap
+from mlci.tabular import TabularModel
 
 TRIALS = 200
 SEED = 1 << 32  # one more than a study can have: none of its tasks is among these
@@ -77,6 +79,29 @@ def forecast_calibration(settings: Settings, store: Store) -> Calibration:
         sys.modules[__name__],
     ]
     return _calibration(store.get("forecasts", forecast_inputs(settings), modules, compute))
+
+
+def recorded_calibration(
+    settings: RecordedSettings,
+    model: TabularModel,
+    demonstrations: Sequence[Demonstration],
+    store: Store,
+) -> Calibration:
+    """The map for recorded demonstrations, by tasks like theirs; from the store or computed."""
+    tasks = [demonstration.task for demonstration in demonstrations]
+    exact_ends = settings.inference.exact_ends
+    numbers = [[*task.start, *task.goal.lower, *task.goal.upper, task.horizon] for task in tasks]
+    depends = (
+        model_inputs(settings, settings.candidates),
+        [[repr(float(number)) for number in row] for row in numbers],  # infinite sides are no JSON
+        exact_ends,
+    )
+
+    def compute() -> dict[str, np.ndarray]:
+        return _arrays(calibrate(model, tasks, trials=TRIALS, exact_ends=exact_ends))
+
+    modules = [mlci.calibration, system_module(settings.model), sys.modules[__name__]]
+    return _calibration(store.get("recorded_forecasts", depends, modules, compute))
 
 
 def forecast_table(calibration: Calibration) -> pd.DataFrame:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.config.settings import ESTIMATE, Settings
+from experiments.point.forecasts import forecast_calibration
 from experiments.point.stages import tabular_model
 from experiments.point.trials import TrialSet, demonstrations
 from experiments.tracking.store import Store
+from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.inference import Inference
@@ -31,6 +33,7 @@ class PointInference:
         truth: (C',) mask over the model's regions: the truth's boxes.
         inference: from the N demonstrations about the C hypotheses.
         diagnosis: how the model moves.
+        calibration: how often the model's forecasts come true, where evidence is to be calibrated.
     """
 
     trials: TrialSet
@@ -41,6 +44,7 @@ class PointInference:
     truth: Bools
     inference: Inference
     diagnosis: Diagnosis
+    calibration: Calibration | None = None
 
     @property
     def unreachable(self) -> int:
@@ -68,12 +72,15 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         for number in numbers
     )
     hypotheses = model.regions.mask(settings.candidates.names)
+    calibration = forecast_calibration(settings, store) if settings.inference.calibrate else None
+    forecast_map = None if calibration is None else calibration.map
     inference = infer(
         model,
         paths,
         hypotheses=hypotheses,
         prior_none=settings.inference.prior,
-        rates=settings.inference.rates(calibrated=False),
+        rates=settings.inference.rates(calibrated=forecast_map is not None),
+        calibration=forecast_map,
         exact_ends=settings.inference.exact_ends,
         tolerance=np.inf,  # the demonstrator has decided which ends are near enough to the goal
     )
@@ -88,4 +95,5 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         truth=model.regions.mask(settings.constraint.names),
         inference=inference,
         diagnosis=diagnose(model),
+        calibration=calibration,
     )

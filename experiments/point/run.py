@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
-from experiments.console import answer_lines, diagnosis_lines, measure_lines, trial_lines
+from experiments.console import answer_lines, diagnosis_lines, entry, measure_lines, trial_lines
 from experiments.point.inference import infer_point
 from experiments.point.measures import measure_point
 from experiments.point.tables import point_tables
@@ -41,6 +41,9 @@ def run_point(
     covered = np.flatnonzero(inference.hypotheses.inside(settings.constraint)).tolist()
     for line in answer_lines(result, top, covered):
         log(line)
+    if inferred.calibration is not None:
+        for line in entry("calibration", inferred.calibration.summary()):
+            log(line)
     for line in trial_lines(inferred.trials.counts()):
         log(line)
     for line in diagnosis_lines(

@@ -17,7 +17,7 @@ from scipy import sparse
 import mlci.constant_controls
 import mlci.reachability
 import mlci.tabular
-from experiments.config.settings import Settings
+from experiments.config.settings import ModelSettings, Settings
 from experiments.tracking.store import Store, Stored
 from mlci.constant_controls import tabulate_escapes
 from mlci.grids import Grid
@@ -88,7 +88,7 @@ def tabular_model(settings: Settings, store: Store) -> TabularModel:
     )
 
 
-def model_inputs(settings: Settings, regions: Regions) -> tuple[Any, ...]:
+def model_inputs(settings: ModelSettings, regions: Regions) -> tuple[Any, ...]:
     """All that the tabular model with the crossings of some regions depends on, beside code."""
     return (
         settings.system,

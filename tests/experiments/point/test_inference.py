@@ -6,10 +6,13 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from experiments.config.settings import Settings
+from experiments.point.forecasts import forecast_calibration
 from experiments.point.inference import infer_point
 from experiments.tracking.store import Store
+from mlci.calibration import Calibration
 from mlci.evidence import Rates
 from mlci.preparation import infer
 
@@ -47,3 +50,23 @@ def test_settings_reach_the_inference(settings: Settings, tmp_path: Path) -> Non
         np.testing.assert_array_equal(demonstration.task.goal.upper, trials.goal_upper[number])
         assert demonstration.task.horizon == settings.horizon
     assert point.unreachable == np.sum(~point.inference.reachable)
+
+
+def test_evidence_is_calibrated_where_it_can_be(
+    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = dataclasses.replace(settings.inference, calibrate=True)
+    settings, store = dataclasses.replace(settings, inference=asked), Store(tmp_path)
+    point = infer_point(settings, store)
+    assert point.inference.calibration == forecast_calibration(settings, store).map is not None
+    assert point.inference.rates.model_error == 0
+    plain = dataclasses.replace(settings, inference=dataclasses.replace(asked, calibrate=False))
+    uncalibrated = infer_point(plain, store).inference
+    np.testing.assert_array_equal(point.inference.avoidance, uncalibrated.avoidance)
+    assert not np.allclose(point.inference.evidence, uncalibrated.evidence)
+    monkeypatch.setattr(
+        "experiments.point.inference.forecast_calibration", lambda *_: Calibration(200, 3)
+    )
+    hopeless = infer_point(settings, store)
+    assert "not calibrated" in hopeless.calibration.summary()
+    np.testing.assert_array_equal(hopeless.inference.evidence, uncalibrated.evidence)
