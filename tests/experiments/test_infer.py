@@ -29,8 +29,14 @@ TRUTH = Regions(Pendulum().space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])
 
 
 def infer(folder: Path, *overrides: str) -> subprocess.CompletedProcess[str]:
-    """The command's end and words, in a folder."""
-    return run_here(command.main, f"results={folder / 'results'}", *overrides, folder=folder)
+    """The command's end and words, in a folder; to be quick, evidence is not calibrated."""
+    return run_here(
+        command.main,
+        f"results={folder / 'results'}",
+        "inference.calibrate=false",
+        *overrides,
+        folder=folder,
+    )
 
 
 def saved(folder: Path) -> Path:

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from tiny_point import TINY, composed
 
-from experiments.config.read import read_config
+from experiments.config.read import read_config, read_recorded_config
 from experiments.config.settings import Settings
 from experiments.point import forecasts
 from experiments.point.forecasts import forecast_calibration, forecast_table
 from experiments.tracking.store import Store
-from mlci.calibration import Calibration, calibrate_on
+from mlci.calibration import Calibration, calibrate, calibrate_on
+from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.simulate import EULER
 from mlci.tabular import action_grid, discretize
@@ -102,3 +103,28 @@ def test_the_table_has_both_forecasts(calibration: Calibration) -> None:
 def test_trials_are_none_of_the_studys() -> None:
     """A seed of settings is below 2^32."""
     assert forecasts.SEED == 2**32
+
+
+def test_recordings_are_calibrated_by_tasks_like_theirs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = [word for word in TINY if word.split("=")[0] in ("dt", "actions", "grid.shape")]
+    recorded = ["demonstrations=x", "system=double_integrator", "hypotheses.shape=[10,null]"]
+    settings = read_recorded_config(composed(*recorded, *words, name="infer"))
+    system = settings.model
+    actions = action_grid(system, settings.action_counts)
+    model = discretize(system, settings.cells, actions, settings.dt, settings.candidates)
+    paths = [
+        Demonstration.from_path(np.linspace([-1, 0], [end, 0], 201), 0.01) for end in (0.5, 1.0)
+    ]
+    store = Store(tmp_path)
+    first = forecasts.recorded_calibration(settings, model, paths, store)
+    assert first.map == calibrate(model, [path.task for path in paths]).map is not None
+
+    def again(*_: object, **__: object) -> Calibration:
+        raise AssertionError("it is stored")
+
+    monkeypatch.setattr(forecasts, "calibrate", again)
+    assert forecasts.recorded_calibration(settings, model, paths, store).map == first.map
+    with pytest.raises(AssertionError, match="it is stored"):  # other tasks are not
+        forecasts.recorded_calibration(settings, model, paths[:1], store)

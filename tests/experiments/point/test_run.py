@@ -89,7 +89,7 @@ def test_lines_tell_the_answer_first_then_counts_diagnosis_and_measures(point: t
     once = [head for head in heads if head != "warning"]
     assert once == [
         "answer", "95 % credible", "assumed", "rests on",
-        "demonstrations", "discretisation", "measures",
+        "calibration", "demonstrations", "discretisation", "measures",
     ]  # fmt: skip
     best = tables["hypotheses"].sort_values(["rank", "hypothesis"]).iloc[0]
     assert lines[0].startswith(
