@@ -54,23 +54,19 @@ def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) 
         top: hypotheses that are printed.
         truth: numbers of the hypotheses that the truth covers, as far as it is known.
     """
-    inference, credible = answer.inference, answer.credible
+    inference, credible = answer.inference, answer.inference.credible
     names, space = inference.hypotheses.names, inference.hypotheses.space
     yield from entry("answer", _first_words(answer))
     yield from _ranking_lines(inference, top, truth)
-    none = "no constraint and " if credible.has_none else ""
-    yield from entry(
-        f"{100 * credible.share:g} % credible",
-        f"{none}{len(credible.regions)} of {len(names)} regions"
-        + (f", in {counted(len(credible.areas), 'area')}:" if credible.areas else ""),
-    )
+    colon = ":" if credible.areas else ""
+    yield from entry(f"{100 * credible.share:g} % credible", f"{credible}{colon}")
     for area in credible.areas[:_AREAS]:
         members = listed([names[i] for i in area.regions])
         yield from entry(
             "", f"{probability(area.probability)} in {members}: {bounds(area.hull, space)}", hang=2
         )
     if len(credible.areas) > _AREAS:
-        yield from entry("", f"and {counted(len(credible.areas) - _AREAS, 'more area')}")
+        yield from entry("", f"and {len(credible.areas) - _AREAS} more")
     yield from entry("assumed", "; ".join(answer.assumptions))
     yield from entry("rests on", _carrier_words(answer))
     yield from entry("", _left_out_words(answer))
@@ -177,11 +173,6 @@ def _side(box: Box, d: int) -> str:
     if not np.isfinite(box.lower[d]):
         return "any"
     return f"{box.lower[d]:.4g} to {box.upper[d]:.4g}"
-
-
-def counted(count: int, noun: str) -> str:
-    """A count with its noun."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def entry(title: str, text: str, hang: int = 0) -> list[str]:

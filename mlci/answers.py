@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from mlci.credible_sets import CredibleSet, credible_set
 from mlci.demonstrations import Demonstration
 from mlci.grids import Grid
 from mlci.inference import Inference
@@ -31,7 +30,6 @@ class Answer:
 
     Attributes:
         inference: from N demonstrations about C hypotheses.
-        credible: the 95 % credible set.
         support: what the first region's gain rests on.
         misfit: how the demonstrations compare with the model's own trajectories.
         unseen: numbers of the regions that none of the tasks could have shown.
@@ -41,7 +39,6 @@ class Answer:
     """
 
     inference: Inference
-    credible: CredibleSet
     support: Support
     misfit: Misfit
     unseen: Ints
@@ -69,6 +66,7 @@ class Answer:
     def record(self) -> dict[str, Any]:
         """The answer for programs, fit for JSON: infinite and missing numbers are None."""
         inference, names = self.inference, self.inference.hypotheses.names
+        credible = inference.credible
         space, first = inference.hypotheses.space, self.support.region
         return {
             "first": {
@@ -78,10 +76,10 @@ class Answer:
             },
             "posterior_none": inference.posterior_none,
             "credible_set": {
-                "share": self.credible.share,
-                "probability": self.credible.probability,
-                "no_constraint": self.credible.has_none,
-                "regions": [names[i] for i in self.credible.regions],
+                "share": credible.share,
+                "probability": credible.probability,
+                "no_constraint": credible.has_none,
+                "regions": [names[i] for i in credible.regions],
                 "areas": [
                     {
                         "regions": [names[i] for i in area.regions],
@@ -89,7 +87,7 @@ class Answer:
                         "lower": dict(zip(space.names, map(_finite, area.hull.lower), strict=True)),
                         "upper": dict(zip(space.names, map(_finite, area.hull.upper), strict=True)),
                     }
-                    for area in self.credible.areas
+                    for area in credible.areas
                 ],
             },
             "assumptions": self.assumptions,
@@ -162,7 +160,6 @@ def answer(
     )
     return Answer(
         inference=inference,
-        credible=credible_set(inference.hypotheses, inference.posterior, inference.posterior_none),
         support=support(inference),
         misfit=misfit(distributions, inference.phi, inference.violated, hypotheses=hypotheses),
         unseen=unseen(inference),

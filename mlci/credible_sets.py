@@ -49,6 +49,11 @@ class CredibleSet:
     probability: float
     areas: tuple[Area, ...]
 
+    def __str__(self) -> str:
+        none = "no constraint" if self.has_none else ""
+        regions = f"{_counted(len(self.regions), 'region')} in {_counted(len(self.areas), 'area')}"
+        return " and ".join(filter(None, [none, regions if len(self.regions) else ""]))
+
 
 def credible_set(
     hypotheses: Regions, posterior: Floats, posterior_none: float, share: float = 0.95
@@ -129,3 +134,8 @@ def _arc(lower: Floats, upper: Floats, period: float) -> tuple[float, float]:
     if extent[best] >= period - slack:
         return -np.inf, np.inf
     return float(arcs[best, 0]), float(arcs[best, 0] + extent[best])
+
+
+def _counted(count: int, noun: str) -> str:
+    """A count with its noun."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"

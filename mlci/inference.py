@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from mlci.credible_sets import CredibleSet, credible_set
 from mlci.evidence import PAPER, Ranking, Rates, log_evidence, rank_constraints
 from mlci.forecasts import ForecastMap, is_possible, region_sizes
 from mlci.regions import Regions
@@ -203,14 +204,20 @@ class Inference:
         }
         return pd.DataFrame(columns).iloc[self.order].reset_index(drop=True)
 
+    @cached_property
+    def credible(self) -> CredibleSet:
+        """The 95 % credible set: the fewest regions, and perhaps "no constraint", that hold it."""
+        return credible_set(self.hypotheses, self.posterior, self.posterior_none)
+
     def summary(self, rows: int = _ROWS_OF_SUMMARY) -> str:
-        """What was inferred, in a few lines: the most likely hypotheses, and warnings."""
+        """What was inferred, in a few lines: the first hypotheses, credible set, warnings."""
         table = self.to_frame().head(rows).to_string(index=False, float_format="{:.3g}".format)
         return "\n".join(
             [
                 f"{len(self.names)} demonstrations, {len(self.hypotheses)} hypotheses; probability "
                 f"of no constraint {self.posterior_none:.3g}",
                 table,
+                f"{100 * self.credible.share:g} % credible: {self.credible}",
                 *(f"warning: {warning}" for warning in self.warnings),
             ]
         )

@@ -43,13 +43,13 @@ MLCI = {
     "mlci.forecasts": "mlci.regions",
     "mlci.forecast_scores": "mlci.forecasts",
     "mlci.rule_breaking": "mlci.evidence",
-    "mlci.inference": "mlci.forecasts mlci.rule_breaking",
+    "mlci.inference": "mlci.forecasts mlci.rule_breaking mlci.credible_sets",
     "mlci.preparation": "mlci.inference mlci.maxent",
     "mlci.calibration": "mlci.forecast_scores mlci.demonstrator mlci.preparation",
     "mlci.credible_sets": "mlci.regions",
     "mlci.support": "mlci.inference",
     "mlci.misfit": "mlci.maxent",
-    "mlci.answers": "mlci.credible_sets mlci.misfit mlci.support",
+    "mlci.answers": "mlci.misfit mlci.support",
     "mlci.metrics": "mlci.evidence",
 }
 # What mlci may import of others: no configs, no files' formats but Parquet, no figures.

@@ -9,7 +9,6 @@ import pytest
 
 from experiments.console import answer_lines, bounds, entry, probability
 from mlci.answers import Answer
-from mlci.credible_sets import credible_set
 from mlci.evidence import PAPER, Rates
 from mlci.inference import Inference
 from mlci.misfit import Misfit
@@ -48,7 +47,6 @@ def answer(
     count = len(alpha)
     return Answer(
         inference,
-        credible_set(hypotheses, inference.posterior, inference.posterior_none),
         support(inference),
         Misfit(np.zeros(count, int), np.zeros(count), np.ones(count), np.ones(count)),
         np.arange(0),
@@ -68,7 +66,7 @@ def test_the_answer_word_by_word() -> None:
         "  0       8.517      0.974  0 to 1  -6 to 0",
         "  2       4.711      0.022  1 to 2  -6 to 0           (truth)",
         "  1       0.693     <0.001  0 to 1  0 to 6",
-        "95 % credible   1 of 12 regions, in 1 area:",
+        "95 % credible   1 region in 1 area:",
         "                0.974 in 0: angle 0 to 1 rad, angular velocity -6 to 0 rad/s",
         "assumed         at most one region is forbidden; prior of none 0.5, the rest",
         "                shared equally; model error 0; rule breaking 0; temperature 1;",
@@ -86,7 +84,7 @@ def test_what_is_printed_where_there_is_little_to_say() -> None:
     assert "no region is more likely than none, whose probability is 0.5" in text
     assert "rests on nothing: no demonstration speaks for 0" in text
     assert "one demonstration alone, which cannot be left out" in text
-    assert "95 % credible no constraint and 11 of 12 regions, in 1 area:" in text
+    assert "95 % credible no constraint and 11 regions in 1 area:" in text
     text = said(answer(PLANE, (6, 2), [[0.01, 1.0], [1.0, 0.1]]))
     assert (
         "0 stays first when any but 1 of 2 demonstrations is left out; first are 1 without "
@@ -94,8 +92,8 @@ def test_what_is_printed_where_there_is_little_to_say() -> None:
     ) in text
     apart = np.where(np.isin(np.arange(25), [0, 2, 10, 12, 20]), 1e-4, 1.0).tolist()
     text = said(answer(BODY, (None, 5, 5, None), [apart]))
-    assert "in 5 areas:" in text
-    assert "and 2 more areas" in text
+    assert "5 regions in 5 areas:" in text
+    assert "and 2 more" in text
 
 
 def said(each: Answer) -> str:

@@ -50,7 +50,7 @@ def result() -> Answer:
 def test_the_parts_are_of_the_inference(result: Answer) -> None:
     inference = result.inference
     assert result.support.region == inference.order[0]
-    assert result.credible.share == 0.95
+    assert result.inference.credible.share == 0.95
     assert result.misfit.count.tolist() == inference.violated.sum(axis=1).tolist()
     assert result.misfit.is_rare.tolist() == [False, False, False, True]
     (rare,) = [text for text in result.warnings if "nearly impossible" in text]
@@ -88,7 +88,7 @@ def test_the_record_is_json_with_the_same_numbers(result: Answer) -> None:
         str(i) for i in result.support.first_without
     ]
     area = record["credible_set"]["areas"][0]
-    assert area["regions"] == [str(i) for i in result.credible.areas[0].regions]
+    assert area["regions"] == [str(i) for i in result.inference.credible.areas[0].regions]
     assert set(area["lower"]) == set(SYSTEM.space.names)
     assert record["warnings"] == result.warnings
     endless = replace(

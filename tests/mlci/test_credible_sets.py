@@ -106,6 +106,17 @@ def test_boxes_of_any_shape() -> None:
     )
 
 
+def test_a_set_in_words() -> None:
+    for chances, none, words in (
+        ([0.5, 0, 0, 0.3, 0.2, 0], 0.0, "3 regions in 2 areas"),
+        ([1, 0, 0, 0, 0, 0], 0.0, "1 region in 1 area"),
+        ([0.2, 0, 0, 0, 0, 0], 0.8, "no constraint and 1 region in 1 area"),
+        ([0, 0, 0, 0, 0, 0], 1.0, "no constraint"),
+    ):
+        regions = Regions.from_grid(SPACE, (6, None))
+        assert str(credible_set(regions, np.array(chances), none)) == words
+
+
 def test_no_constraint_wins_ties_and_may_be_all() -> None:
     one = Regions.from_grid(SPACE, (1, 1))
     result = credible_set(one, np.array([0.5]), 0.5, 0.5)

@@ -165,7 +165,7 @@ def test_repr_and_summary_say_what_was_inferred_and_what_is_doubtful() -> None:
         HYPOTHESES, ("a",), np.ones((1, 100)), np.zeros((1, 100), bool), np.ones(1, bool)
     )
     assert many.warnings == []
-    assert [len(words.splitlines()) for words in (repr(many), many.summary())] == [7, 12]
+    assert [len(words.splitlines()) for words in (repr(many), many.summary())] == [8, 13]
 
 
 def test_wrong_input_is_refused(model: TabularModel, prepared: PreparedInference) -> None:
