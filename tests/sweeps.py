@@ -1,4 +1,4 @@
-"""Sweeps in processes of their own, of points that take a fraction of a second."""
+"""Sweeps here and in processes of their own, of points that take a fraction of a second."""
 
 import contextlib
 import os
@@ -7,7 +7,11 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest import mock
 
+import commands
+
+from experiments import run as run_command
 from experiments.config.paths import CHECKOUT
 
 RUN = [sys.executable, str(CHECKOUT / "experiments" / "run.py")]
@@ -84,6 +88,27 @@ def run(folder: Path, *arguments: str) -> tuple[int, str, str]:
     process = start(folder, *arguments)
     out, err = process.communicate(timeout=120)
     return process.returncode, out, err
+
+
+def run_here(folder: Path, *arguments: str) -> tuple[int, str, str]:
+    """The same from this process, which need not import everything again; its workers do.
+
+    There is one worker, unless the arguments say otherwise.
+    """
+    words = [*TINY, "workers=1", f"results={folder / 'results'}", *arguments]
+    path = f"{folder}{os.pathsep}{CHECKOUT}"
+    usual = signal.getsignal(signal.SIGTERM)
+    with (
+        mock.patch.dict(os.environ, PYTHONPATH=path),
+        mock.patch.object(sys, "path", [str(folder), *sys.path]),
+    ):
+        try:
+            done = commands.run_here(run_command.main, *words, folder=folder)
+        finally:
+            signal.signal(signal.SIGTERM, usual)
+            for module in folder.glob("*.py"):  # another folder may have one of the same name
+                sys.modules.pop(module.stem, None)
+    return done.returncode, done.stdout, done.stderr
 
 
 def running(group: int) -> list[str]:

@@ -6,7 +6,9 @@ import ast
 import importlib
 import os
 import re
+import shlex
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,15 +18,20 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from figure_study import measure_rows
+from commands import run_here
+from figure_study import study_tables
 from markdown_it import MarkdownIt
 from sybil import Document, Example
 from sybil.evaluators.python import PythonEvaluator
 from sybil.parsers.markdown import CodeBlockParser
 
 import mlci
+from experiments import advise, infer, results, run
 from mlci.simulate import rollout
 from mlci.systems import Pendulum
+from paper_figures import __main__ as figures
+from paper_figures import state_space
+from paper_figures.report import __main__ as report
 
 ROOT = Path(__file__).resolve().parents[1]
 CODE = ("conf", "experiments", "mlci", "paper_figures")
@@ -39,16 +46,23 @@ READMES = [
 SHORT = [
     (r"^make (\w+)", r"make -n \1"),
     (r"^pip install 'mlci\[(\w+)\]'", r"grep '^\1 = ' pyproject.toml"),
-    (r"^(python -m paper_figures( [a-z ]+)?)$", r"\1 --jobs 1"),
-    (
-        r"^(mlci-run .*subject=unicycle.*)",
-        r"\1 scale=smoke grid.shape=[8,8,8] safety.shape=[21,21,12]",
-    ),
-    (r"^(mlci-figures .*)", r"\1 --jobs 1"),
+    (r"^(python -m paper_figures( [a-z ]+)?)( --jobs 2)?$", r"\1 --jobs 1"),
+    # These are run, and what they make is looked at, in experiments/config/test_own_system.py.
+    (r"^mlci-.* ?unicycle.*", "true"),
     (r"experiment=paper", r"experiment=in_cell"),
-    (r"^(?!.*scale=smoke)(.*run(\.py)? -m .*)", r"\1 scale=smoke sweep.dry_run=true"),
-    (r"^(?!.*scale=smoke)(.*run(\.py)?( .*)?)$", r"\1 scale=smoke"),
+    (r"^(?!.*scale=smoke)(.*run\.py -m .*)", r"\1 scale=smoke sweep.dry_run=true"),
+    (r"^(?!.*scale=smoke)(.*run\.py( .*)?)$", r"\1 scale=smoke"),
+    (r"^(.*run\.py .*)", r"\1 workers=1"),
 ]
+# Commands that run here, as starting each of them takes a second or two.
+MAINS = {
+    "experiments/run.py": run.main,
+    "experiments/infer.py": infer.main,
+    "experiments/advise.py": advise.main,
+    "experiments/results.py": results.main,
+    "paper_figures": figures.main,
+    "paper_figures.report": report.main,
+}
 
 
 def short(command: str) -> str:
@@ -66,21 +80,16 @@ def with_identities(command: str) -> str:
 
 def run_commands(example: Example) -> None:
     """Runs a block of commands in the current folder; the first that fails is told."""
-    block = example.parsed.replace("\\\n", " ")
-    commands = [re.sub(r"\s+#\s.*", "", line).strip() for line in block.splitlines()]
-    done = subprocess.run(
-        ["bash", "-ex"],
-        input="\n".join(map(short, commands)),
-        env={
-            **os.environ,
-            "PATH": os.pathsep.join([*example.namespace["programs"], os.environ["PATH"]]),
-            "PYTHONPATH": str(example.namespace["checkout"]),
-        },
-        capture_output=True,
-        text=True,
-        timeout=600,
-    )
-    assert done.returncode == 0, f"{example.path}, line {example.line}:\n{done.stderr}"
+    for line in example.parsed.replace("\\\n", " ").splitlines():
+        command = short(re.sub(r"\s+#\s.*", "", line).strip())
+        words = [word for word in shlex.split(command) if word != "-m" or "run.py" in command]
+        if words[:1] == ["python"]:
+            done = run_here(MAINS[words[1]], *words[2:], folder=Path.cwd())
+        else:
+            done = subprocess.run(
+                ["bash", "-c", command], capture_output=True, text=True, timeout=60
+            )
+        assert done.returncode == 0, f"{example.path}, line {example.line}, {line}:\n{done.stderr}"
 
 
 def write_file(example: Example) -> None:
@@ -114,38 +123,40 @@ def name(readme: Path) -> str:
 
 
 @pytest.fixture
-def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The current folder: a copy of the checkout, with recordings and few results."""
-    copy = tmp_path / "checkout"
-    for folder in CODE:
-        shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns("__pycache__"))
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The current folder, with recordings, few results, and what some commands look for."""
     for file in ("Makefile", "pyproject.toml", "requirements.lock"):
-        shutil.copy(ROOT / file, copy)
-    (copy / ".venv").symlink_to(sys.prefix)
-    (copy / "cluster").mkdir()
-    (copy / "cluster" / "sbatch").touch(mode=0o755)  # as if there were a SLURM cluster
-    (copy / "recorded").mkdir()
+        shutil.copy(ROOT / file, tmp_path)
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    (tmp_path / "cluster").mkdir()
+    (tmp_path / "cluster" / "sbatch").touch(mode=0o755)  # as if there were a SLURM cluster
+    monkeypatch.setenv("PATH", str(tmp_path / "cluster"), prepend=os.pathsep)
+    (tmp_path / "recorded").mkdir()
     for start in (0.5, 1.0):  # of a pendulum, and of a vehicle that drives along x
         time = np.arange(501) * 0.01
         path = rollout(Pendulum(), [start, 0.0], np.zeros((500, 1)), 0.01)
         drive = {"x": 0.3 * time - start, "y": start, "heading": 0.0}
         table = pd.DataFrame({"time": time, "angle": path[:, 0], "angular_velocity": path[:, 1]})
-        table.assign(**drive).to_csv(copy / "recorded" / f"from_{start}.csv", index=False)
+        table.assign(**drive).to_csv(tmp_path / "recorded" / f"from_{start}.csv", index=False)
     for study in ("paper", "telescope"):  # made-up tables, for what is drawn from tables alone
-        tables = copy / "results" / study / "tables"
+        tables = tmp_path / "results" / study / "tables"
         tables.mkdir(parents=True)
-        measure_rows().to_csv(tables / "measures.csv", index=False)
-    monkeypatch.chdir(copy)
-    return copy
+        for name in state_space.TABLES:
+            study_tables()[name].to_csv(tables / f"{name}.csv", index=False)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    usual = signal.getsignal(signal.SIGTERM)
+    yield tmp_path
+    signal.signal(signal.SIGTERM, usual)
+    for module in tmp_path.glob("*.py"):
+        sys.modules.pop(module.stem, None)
 
 
 @pytest.mark.parametrize("readme", READMES, ids=name)
-def test_code_and_commands_run(readme: Path, checkout: Path) -> None:
+@pytest.mark.usefixtures("folder")
+def test_code_and_commands_run(readme: Path) -> None:
     parsers = [CodeBlockParser(kind, evaluate) for kind, evaluate in KINDS.items()]
-    document = Document.parse(str(readme), *parsers)
-    programs = [str(Path(sys.executable).parent), str(checkout / "cluster")]
-    document.namespace.update(checkout=checkout, programs=programs)
-    for example in document:
+    for example in Document.parse(str(readme), *parsers):
         example.evaluate()
 
 

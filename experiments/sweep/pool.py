@@ -59,6 +59,7 @@ class PoolLauncher(Launcher):
         returns = {job: JobReturn(overrides=list(job)) for job in jobs}  # UNKNOWN until it ran
         terminal = sys.stderr.isatty()
         bar = tqdm(total=len(jobs), bar_format=_BAR, disable=not terminal)
+        others = set(multiprocessing.active_children())
         pool = ProcessPool(
             min(self.workers, len(jobs)),
             context=multiprocessing.get_context("spawn"),
@@ -100,7 +101,7 @@ class PoolLauncher(Launcher):
         finally:
             pool.stop()
             # The pool closes its locks before its workers; one that still starts would complain.
-            for worker in multiprocessing.active_children():
+            for worker in set(multiprocessing.active_children()) - others:
                 worker.kill()
             pool.join()
             bar.close()

@@ -1,8 +1,7 @@
 """The own system of conf/README.md, in a folder of its own, and what is refused about others."""
 
-import os
 import re
-import subprocess
+import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +12,7 @@ from commands import run_here
 from refusals import refusal
 from tiny_point import composed
 
-from experiments import advise, infer
+from experiments import advise, infer, results, run
 from experiments.config.paths import CHECKOUT, CONF
 from experiments.config.read import read_config
 from experiments.tracking import sources
@@ -23,12 +22,17 @@ from paper_figures import __main__ as figures
 SECTION = (CONF / "README.md").read_text().split("\n## Your own system\n")[1]
 # A module, a config, and the commands.
 BLOCKS = re.findall(r"^```\w+\n(.*?)^```", SECTION, flags=re.MULTILINE | re.DOTALL)
-# What is imported anew, as by a user, and what is run here because that is quicker.
-SCRIPTS = {"mlci-run": "run.py", "mlci-results": "results.py"}
-MAINS = {"mlci-infer": infer.main, "mlci-advise": advise.main, "mlci-figures": figures.main}
+MAINS = {
+    "mlci-run": run.main,
+    "mlci-infer": infer.main,
+    "mlci-advise": advise.main,
+    "mlci-figures": figures.main,
+    "mlci-results": results.main,
+}
+CACHES = (sources._read_source, sources._module_names, sources._neighbours)
 SMALL = ["grid.shape=[8,8,8]"]
 SMOKE = {
-    "mlci-run": ["scale=smoke", "safety.shape=[21,21,12]", *SMALL],
+    "mlci-run": ["scale=smoke", "safety.shape=[21,21,12]", "workers=1", *SMALL],
     "mlci-infer": SMALL,
     "mlci-advise": [*SMALL, "grids=[[8,8,8]]", "dts=[1.0]", "pairs=4", "remedy=1"],
     "mlci-figures": ["--jobs", "1"],
@@ -48,20 +52,19 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def command(folder: Path, line: str) -> tuple[int, str, str]:
-    """Exit status, output and errors of a command of the README, at a small scale."""
+    """Exit status, output and errors of a command of the README, at a small scale.
+
+    It runs here, as starting it takes a second or two; what the folder holds is read anew.
+    """
     name, *words = line.split()
-    words += SMOKE.get(name, [])
-    if name in MAINS:
-        done = run_here(MAINS[name], *words, folder=folder)
-    else:
-        done = subprocess.run(
-            [sys.executable, str(CHECKOUT / "experiments" / SCRIPTS[name]), *words],
-            cwd=folder,
-            env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
+    sys.modules.pop("unicycle", None)
+    for cached in CACHES:
+        cached.cache_clear()
+    usual = signal.getsignal(signal.SIGTERM)
+    try:
+        done = run_here(MAINS[name], *words, *SMOKE.get(name, []), folder=folder)
+    finally:
+        signal.signal(signal.SIGTERM, usual)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -115,7 +118,7 @@ def test_source_counts_what_a_module_imports_from_beside_it(
     for helper, other in (("a = 1", "b = 1"), ("a = 2", "b = 1"), ("a = 2", "b = 2")):
         (tmp_path / "beside_it.py").write_text(helper)
         (tmp_path / "not_imported.py").write_text(other)
-        for cached in (sources._read_source, sources._module_names, sources._neighbours):
+        for cached in CACHES:
             cached.cache_clear()
         hashes.append(Point.planned({"system": {"target": "mine_own.Mine"}}, tmp_path).source)
     assert hashes[0] != hashes[1] == hashes[2]
@@ -185,7 +188,7 @@ def test_wrong_system_is_refused(
     monkeypatch.syspath_prepend(str(tmp_path))
     for name in ("mine", "bad", "worse"):
         monkeypatch.delitem(sys.modules, name, raising=False)
-    own = ["~system.gravity", "~system.length", "~system.speed_limit", "~system.control_limit"]
+    own = [f"~system.{key}" for key in composed()["system"] if key != "_target_"]
     words = [argument, *(own if "_target_" in argument else [])]
     said = refusal(words, monkeypatch, capsys)
     assert REFUSED[argument].replace("{}", str(tmp_path)) in said

@@ -117,12 +117,31 @@ def test_every_setting_changes_identity() -> None:
 
 
 SETTINGS = "hydra.sweeper.settings="
-WRONG = [
+COMMANDS = [
     ("dtt=0.2", "dtt: unknown key; did you mean dt?"),
-    ("+dtt=0.2", "dtt: unknown key; did you mean dt?"),
     ("demonstrations.pars=3", "demonstrations.pars: unknown key; did you mean pairs?"),
-    ("++demonstrations.pars=3", "demonstrations.pars: unknown key; did you mean pairs?"),
     ("system.gravty=2", "system.gravty: unknown key; did you mean gravity?"),
+    ("grid=300", "grid: there is no 300; there are 100, 400, 900, 1600, 2500"),
+    ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, pain, wall"),
+    ("grdi=100", "grdi: unknown key; did you mean grid?"),
+    ("dt=[1", "dt=[1: cannot be read as key=value"),
+    ("dt", "dt: cannot be read as key=value"),
+    ("dt=fast", "dt: 'fast' is not a finite number"),
+    ("dt=${nothing}", "dt: Interpolation key 'nothing' not found"),
+    ("dt=0.2,0.25", "dt: several values need -m, for a sweep, or dt=[0.2,0.25], for a list"),
+    (
+        "grid.shape=[5,6,7]",
+        "grid.shape: [5, 6, 7] must have 2 entries, one each for angle",
+    ),
+    ("truth.cell=37", "truth.cell: 37 and 1 boxes are given; keep one of them"),
+    ("sweep.time_limit=5", "sweep.time_limit: only a sweep heeds it; add -m, or leave it out"),
+    ("sweep.retries=1", "sweep.retries: only a sweep heeds it"),
+    ("hydra.run.dirr=x", "hydra.run.dirr: unknown key; did you mean dir?"),
+]
+# Values, which are refused once a config is composed.
+VALUES = [
+    ("+dtt=0.2", "dtt: unknown key; did you mean dt?"),
+    ("++demonstrations.pars=3", "demonstrations.pars: unknown key; did you mean pairs?"),
     ("+system.gravty=2", "system.gravty: Pendulum has no such argument; did you mean gravity?"),
     ("system._target_=os.system", "'os.system' is not a subclass of mlci.systems.System"),
     ("system._target_=mlci.systems.System", "is not a subclass"),
@@ -131,19 +150,11 @@ WRONG = [
     ("system.speed_limit=fast", "system.speed_limit: 'fast' is not a finite number"),
     ("~system._target_", "system._target_: missing"),
     ("~system", "system: missing"),
-    ("grid=300", "grid: there is no 300; there are 100, 400, 900, 1600, 2500"),
-    ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, pain, wall"),
-    ("grdi=100", "grdi: unknown key; did you mean grid?"),
-    ("dt=[1", "dt=[1: cannot be read as key=value"),
-    ("dt", "dt: cannot be read as key=value"),
-    ("dt=fast", "dt: 'fast' is not a finite number"),
     ("dt=nan", "dt: nan is not a finite number"),
     ("dt=true", "dt: True is not a finite number"),
     ("dt=", "dt: '' is not a finite number"),
-    ("dt=${nothing}", "dt: Interpolation key 'nothing' not found"),
     ("dt=???", "dt: missing; give it a value"),
     ("~dt", "dt: missing; give it a value"),
-    ("dt=0.2,0.25", "dt: several values need -m, for a sweep, or dt=[0.2,0.25], for a list"),
     ("dt=0", "dt: 0.0 must be above 0"),
     ("inference.rule_breaking=1", "inference.rule_breaking: 1.0 must be below 1"),
     ("inference.rule_breaking=guess", "inference.rule_breaking: 'guess' is not a finite number"),
@@ -164,14 +175,9 @@ WRONG = [
     ("grid.shape=[]", "grid.shape: [] is empty"),
     ("grid.shape=[0,5]", "grid.shape[0]: 0 must be at least 1"),
     ("grid.shape=9", "grid.shape: 9 is not a list"),
-    (
-        "grid.shape=[5,6,7]",
-        "grid.shape: [5, 6, 7] must have 2 entries, one each for angle",
-    ),
     ("system=double_integrator", "truth.boxes[0]: position from 3.14159 to 3.76991 leaves"),
     ("truth.boxes=[]", "truth.boxes: [] is empty; give at least one box, with lower and upper, or"),
     ("truth.name=none", "truth.name: none means that nothing is forbidden; take another name"),
-    ("truth.cell=37", "truth.cell: 37 and 1 boxes are given; keep one of them"),
     ("calibration.sets=-1", "calibration.sets: -1 must be at least 0"),
     (
         "calibration.sets=2",
@@ -196,8 +202,6 @@ WRONG = [
     ("truth.boxes=[{lower:[3,0],upper:[3.1,1]}]", "truth: c1 covers no hypothesis entirely"),
     ("hypotheses.shape=null", "hypotheses: no shape and no boxes"),
     ("study=../x", "study: '../x' cannot name a folder"),
-    ("sweep.time_limit=5", "sweep.time_limit: only a sweep heeds it; add -m, or leave it out"),
-    ("sweep.retries=1", "sweep.retries: only a sweep heeds it"),
     ("workers=0", "workers: 0 must be at least 1"),
     ("dt=pi/0", "dt: 'pi/0' is not a finite number, or a multiple of pi such as \"6/5 pi\""),
     ("seed=" + "9" * 4000, "seed: 9999999999"),
@@ -223,22 +227,29 @@ WRONG = [
     ("actions=[]", "actions: [] is empty; give at least one"),
     ("sweep.only=[done]", "sweep.only[0]: 'done' must be 'missing', 'failed' or 'stale'"),
     ("+sweep.foo=1", "sweep.foo: unknown key; known are dry_run, fail_fast, force, limit, "),
-    ("hydra.run.dirr=x", "hydra.run.dirr: unknown key; did you mean dir?"),
 ]
 
 
-@pytest.mark.parametrize(("argument", "message"), WRONG)
-def test_wrong_value_is_refused(
-    argument: str,
+@pytest.mark.parametrize(("word", "message"), COMMANDS)
+def test_wrong_word_is_refused(
+    word: str,
     message: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    said = refusal([argument, "results=results"], monkeypatch, capsys)
+    said = refusal([word, "results=results"], monkeypatch, capsys)
     assert message in said
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("word", "message"), VALUES)
+def test_wrong_value_is_refused(word: str, message: str) -> None:
+    with pytest.raises(ConfigError) as refusal:
+        read_config(composed(word))
+    assert message in str(refusal.value)
+    assert len(str(refusal.value).splitlines()) < 10
 
 
 @pytest.mark.parametrize(
