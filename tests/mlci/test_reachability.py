@@ -147,7 +147,7 @@ def test_the_value_never_grows_with_the_horizon():
     values = [
         solve_safe_set(PENDULUM, grid, keep_out, horizon=tau).values for tau in (0, 0.3, 1, 3)
     ]
-    np.testing.assert_array_equal(values[0], start)
+    np.testing.assert_allclose(values[0], start, rtol=1e-14)  # there and back through W
     for sooner, later in itertools.pairwise(values):
         assert np.all(later <= sooner + 1e-9)
         assert np.any(later < sooner - 0.01)
@@ -288,3 +288,35 @@ def test_the_pendulums_border_has_its_closed_form_within_half_a_cell(count):
     clear = np.all(around == doomed, axis=0)
     assert 0.05 < np.mean(doomed[clear]) < 0.5
     np.testing.assert_array_equal(safe_set.contains(states[clear]), ~doomed[clear])
+
+
+def cannot_stop(states, left, right):
+    """Whether the pendulum, |u| <= 2, cannot stay out of the angles from left to right.
+
+    Nobody passes the wall, so who comes to it has to stop: under the held u that brakes,
+    w^2 / 2 + cos(angle) - u angle stands still, and w is 0 where the energy is all spent.
+    """
+    angle, velocity = states.T
+    above = left + (angle - left) % (2 * np.pi)
+    below = above - 2 * np.pi
+    falls = velocity**2 / 2 + np.cos(above) - 2 * above > np.cos(right) - 2 * right
+    rises = velocity**2 / 2 + np.cos(below) + 2 * below > np.cos(left) + 2 * left
+    return (above < right) | ((velocity < 0) & falls) | ((velocity > 0) & rises)
+
+
+@pytest.mark.parametrize("count", [51, 101])
+@pytest.mark.parametrize("corners", [WALL, ((1.6 * np.pi, -FREE), (1.8 * np.pi, FREE))])
+def test_the_border_round_a_wall_errs_by_at_most_half_a_cell_to_either_side(corners, count):
+    grid = Grid(PENDULUM.space, (count, count))
+    safe_set = solve_safe_set(PENDULUM, grid, region(PENDULUM, corners))
+    states = np.random.default_rng(0).uniform([0, -5.5], [2 * np.pi, 5.5], (40_000, 2))
+    turns = np.arange(32) / 32 * 2 * np.pi
+    ring = grid.widths / 2 * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    sides = corners[0][0], corners[1][0]
+    doomed = cannot_stop(states, *sides)
+    around = np.array([cannot_stop(states + shift, *sides) for shift in ring])
+    clear = np.all(around == doomed, axis=0)
+    assert 0.2 < np.mean(doomed[clear]) < 0.8
+    wrong = safe_set.contains(states[clear]) == doomed[clear]
+    assert not np.any(wrong & doomed[clear])
+    assert np.sum(wrong) < 0.001 * len(wrong)
