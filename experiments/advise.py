@@ -19,7 +19,7 @@ from tqdm import tqdm
 from experiments.app import DONE, FAILED, run_command
 from experiments.config.read import ConfigError, read_advice_config
 from experiments.config.settings import AdviceSettings
-from experiments.console import table_lines, words
+from experiments.console import noise_words, table_lines, words
 from mlci.demonstrations import Task
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.diagnosis import MOST_UNREACHABLE, Diagnosis, diagnose
@@ -252,7 +252,7 @@ def _actions(settings: AdviceSettings) -> Floats:
 
 
 _HEAD = (
-    "grid", "states", "dt", "samples", "verdict", "goals", "frozen", "cells/step", "leave",
+    "grid", "states", "dt", "samples", "verdict", "goals", "frozen", "cells/step", "leave", "noise",
     "form [s]", "task [ms]",
 )  # fmt: skip
 
@@ -274,6 +274,7 @@ def _row(candidate: Candidate) -> tuple[object, ...]:
         f"{found.frozen[worst]:.0%} {words(names[worst])}",
         f"{found.cells_crossed:.1f}",
         f"{found.leave:.0%}",
+        noise_words(found),
         f"{candidate.discretize_s:.2g}",
         f"{1e3 * candidate.task_s:.2g}" if candidate.reached.any() else "-",
     )

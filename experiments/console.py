@@ -42,8 +42,20 @@ def diagnosis_lines(
         f"space, {diagnosis.cells_crossed:.1f} cells crossed in a step; cells that no action "
         f"changes: {frozen}; {unreachable} of {tasks} goals cannot be reached",
     )
+    if diagnosis.noise:
+        yield from entry(
+            "",
+            f"control noise var(u) dt {noise_words(diagnosis)}, as limits and steps of actions let "
+            "it be at this time step",
+        )
     for concern in diagnosis.concerns(names, unreachable, tasks):
         yield from entry("warning", concern)
+
+
+def noise_words(diagnosis: Diagnosis) -> str:
+    """The tabular agent's control noise, and what it would be without limits, a pair a control."""
+    pairs = zip(diagnosis.noise, diagnosis.free_noise, strict=True)
+    return ", ".join(f"{noise:.3g} of {free:.3g}" for noise, free in pairs)
 
 
 def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) -> Iterator[str]:

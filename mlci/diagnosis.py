@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import softmax
 
+from mlci.spaces import Floats
 from mlci.tabular import TabularModel
 
 # A discretisation is questioned above these shares. In the paper's sweep of the pendulum the truth
@@ -26,12 +28,18 @@ class Diagnosis:
         leave: share of the moves that leave the state space.
         cells_crossed: mean number of cells that a move covers, in its fastest dimension.
         frozen: for each dimension, the share of cells whose number in it no move changes.
+        noise: for each control u, var(u) dt of the tabular agent that holds an action for dt and
+            has no goal: the mean over cells. Empty if it is not known.
+        free_noise: the same without limits and steps of u; temperature / 2 for the reward -u^2,
+            whatever dt is. NaN where the reward does not bound u.
     """
 
     stay: float
     leave: float
     cells_crossed: float
     frozen: tuple[float, ...]
+    noise: tuple[float, ...] = ()
+    free_noise: tuple[float, ...] = ()
 
     def concerns(self, names: Sequence[str], unreachable: int, tasks: int) -> list[str]:
         """What is wrong with the discretisation and what to do about it; empty if nothing is.
@@ -80,4 +88,31 @@ def diagnose(model: TabularModel) -> Diagnosis:
         leave=(model.allowed.size - moves) / model.allowed.size,
         cells_crossed=crossed / (grid.size * len(actions)),
         frozen=tuple(float(share) for share in (grid.size - changing) / grid.size),
+        noise=tuple(_noise(model).tolist()),
+        free_noise=tuple(_free_noise(model).tolist()),
     )
+
+
+def _noise(model: TabularModel) -> Floats:
+    """var(u) dt (m,) of an agent that takes actions with probabilities e^reward / Z, in a cell."""
+    total = np.zeros(model.actions.shape[1])
+    for block in model.blocks():
+        centers, count = model.grid.centers[block], len(model.actions)
+        reward = model.move_reward(
+            np.repeat(centers, count, axis=0), np.tile(model.actions, (len(centers), 1))
+        )
+        probability = softmax(reward.reshape(-1, count), axis=1)
+        mean = probability @ model.actions
+        total += np.sum(probability @ np.square(model.actions) - np.square(mean), axis=0)
+    return np.asarray(total * model.dt / model.grid.size)
+
+
+def _free_noise(model: TabularModel) -> Floats:
+    """var(u) dt (m,) of the Gaussian that the reward's curvature in u makes of e^reward."""
+    n, box = model.grid.centers.shape[1], model.system.control_box
+    middle = np.broadcast_to((box.lower + box.upper) / 2, (model.grid.size, box.dimension))
+    _, hessian = model.system.reward_derivatives(model.grid.centers, middle)
+    curvature = -np.mean(hessian[:, n:, n:], axis=0)  # of -reward
+    if not np.all(np.linalg.eigvalsh(curvature) > 0):
+        return np.full(box.dimension, np.nan)
+    return np.asarray(model.temperature * np.diagonal(np.linalg.inv(curvature)))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mlci.diagnosis import Diagnosis, diagnose
+from mlci.effort import WithEffort
 from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.systems import DoubleIntegrator, Pendulum
@@ -67,3 +68,33 @@ def test_concerns_name_the_trouble_and_the_remedy() -> None:
     leaving = Diagnosis(0.0, 0.8, 9.0, (0.0, 0.0)).concerns(names, 0, 20)
     assert len(leaving) == 1
     assert "widen its bounds" in leaving[0]
+
+
+@pytest.mark.parametrize(
+    ("count", "dt", "noise"),
+    [(9, 0.1, 0.146), (9, 0.2, 0.256), (9, 0.25, 0.298), (9, 0.5, 0.429), (9, 1.0, 0.493)],
+)
+def test_control_noise_is_less_where_actions_end_early(count: int, dt: float, noise: float) -> None:
+    """Against sums by hand; without limits it is half the temperature."""
+    system = Pendulum()
+    regions = Regions.from_grid(system.space, (2, 2))
+    model = discretize(system, Grid(system.space, (4, 4)), action_grid(system, count), dt, regions)
+    diagnosis = diagnose(model)
+    assert diagnosis.noise == pytest.approx((noise,), abs=5e-4)
+    assert diagnosis.free_noise == pytest.approx((0.5,))
+
+
+def test_control_noise_with_wide_actions_is_that_of_the_continuum() -> None:
+    """25 actions in +-6, and at another temperature; a reward that does not bound the control."""
+    system, wide = Pendulum(), np.linspace(-6, 6, 25)[:, None]
+    grid, regions = Grid(system.space, (4, 4)), Regions.from_grid(system.space, (2, 2))
+    for dt in (0.1, 0.2, 0.25, 0.5, 1.0):
+        (noise,) = diagnose(discretize(system, grid, wide, dt, regions)).noise
+        assert 0.478 <= round(noise, 3) <= 0.5
+    hot = diagnose(discretize(system, grid, wide, 1.0, regions, temperature=3.0))
+    assert hot.noise == pytest.approx(hot.free_noise, rel=0.01)
+    assert hot.free_noise == pytest.approx((1.5,))
+    plain = WithEffort(system, np.array([0.0, 0.0, -1.0]))  # no reward at all
+    unbounded = diagnose(discretize(plain, grid, action_grid(plain, 5), 0.5, regions))
+    assert np.isnan(unbounded.free_noise).all()
+    assert unbounded.noise == pytest.approx((2.0 * 0.5,))  # of -2, -1, 0, 1, 2
