@@ -407,7 +407,7 @@ def test_infer_on_a_points_recorded_files_gives_its_ranking_back(
     tmp_path: Path, look, inference: str
 ) -> None:
     """With goals that are ranges, which the ends of the paths do not tell."""
-    words = (f"inference={inference}", "tasks.goal=[0.6,null]")
+    words = (f"inference={inference}", "inference.calibrate=false", "tasks.goal=[0.6,null]")
     point = computed(read_config(composed(*TINY, *words))[0], tmp_path)
     folder = tmp_path / "recorded"
     status, out, _ = look("demonstrations", point.identity[:8], "--out", str(folder))
@@ -417,7 +417,7 @@ def test_infer_on_a_points_recorded_files_gives_its_ranking_back(
     assert sorted(path.stem for path in folder.iterdir()) == [f"trial_{i:03d}" for i in trials]
     model = ["system=double_integrator", "dt=0.5", "actions=3", "grid.shape=[12,8]"]
     done = run_here(
-        infer.main, f"demonstrations={folder}", f"results={tmp_path}", *model, words[0],
+        infer.main, f"demonstrations={folder}", f"results={tmp_path}", *model, *words[:2],
         folder=tmp_path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
