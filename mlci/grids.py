@@ -146,59 +146,56 @@ class Grid:
             (..., *values.shape[1:]), linear between centres, extrapolated linearly over the half
             cell between the outermost centres and the bounds.
         """
-        corners, fraction = self._surround(values, states)
-        batch, n = fraction.shape[:-1], len(self.shape)
-        fraction = fraction.reshape(*batch, *(1,) * (values.ndim - 1), n)
-        for d in range(n):
-            corners = corners[0] + fraction[..., d] * (corners[1] - corners[0])
+        corners, fractions = self._surround(values, states)
+        tail = (1,) * (values.ndim - 1)
+        for fraction in fractions:
+            share = np.reshape(fraction, (*fraction.shape, *tail))
+            corners = corners[0] + share * (corners[1] - corners[0])
         return corners
 
     def slope(self, values: Floats, states: ArrayLike) -> Floats:
         """Exact gradient (..., n) of `interpolate` for values (S,); 0 beyond the bounds."""
-        corners, fraction = self._surround(values, states)
+        corners, fractions = self._surround(values, states)
         slopes = []
         for d in range(len(self.shape)):
             part = corners
             for axis in range(len(self.shape)):
                 rise = part[1] - part[0]
-                part = rise / self.widths[d] if axis == d else part[0] + fraction[..., axis] * rise
+                part = rise / self.widths[d] if axis == d else part[0] + fractions[axis] * rise
             slopes.append(part)
         states, bounds = np.asarray(states), self.space.bounds
         within = (states >= bounds.lower) & (states <= bounds.upper) | self.space.periodic
         return np.where(within, np.stack(slopes, axis=-1), 0.0)
 
-    def _surround(self, values: Floats, states: ArrayLike) -> tuple[Floats, Floats]:
+    def _surround(self, values: Floats, states: ArrayLike) -> tuple[Floats, list[Floats]]:
         """Values at the centres around states, and the place of the states among them.
 
         Returns (2, ..., 2, *batch, ...) values, lower and upper centre along each dimension, and
-        how far (*batch, n) a state is above the lower centre, in cells.
+        for each dimension how far (*batch) a state is above the lower centre, in cells.
         """
-        outermost, lowest, strides = self._limits
-        position = (np.asarray(states) - self._lower) / self.widths - 0.5
-        position = np.minimum(np.maximum(position, outermost[0]), outermost[1])
-        low = np.minimum(np.maximum(np.floor(position), lowest[0]), lowest[1])
-        ends = np.stack([low, low + 1]).astype(np.int64) % self.shape * strides
-        n, batch = len(self.shape), low.shape[:-1]
-        node = np.zeros((), dtype=np.int64)
-        for d in range(n):
+        states, n = np.asarray(states), len(self.shape)
+        node: Ints = np.zeros((), dtype=np.int64)
+        fractions = []
+        # One dimension after the other: numpy is slow along an axis as short as that of dimensions.
+        for d, count in enumerate(self.shape):
+            position = (states[..., d] - self._lower[d]) / self.widths[d] - 0.5
+            if not self.space.periodic[d]:
+                position = np.minimum(np.maximum(position, -0.5), count - 0.5)
+            low = np.floor(position)
+            if not self.space.periodic[d]:
+                low = np.minimum(np.maximum(low, 0.0), max(count - 2.0, 0.0))
+            fractions.append(position - low)
+            below = low.astype(np.int64)
+            if self.space.periodic[d]:
+                below %= count
+            above = np.where(below + 1 == count, 0, below + 1)
+            ends = np.stack([below, above]) * self._strides[d]
             along = (2 if axis == d else 1 for axis in range(n))
-            node = node + ends[..., d].reshape(*along, *batch)
+            node = node + ends.reshape(*along, *low.shape)
         # A state that is not a number belongs to no cell: any will do, as its fraction is nan.
-        return values.take(node, axis=0, mode="clip"), position - low
+        return values.take(node, axis=0, mode="clip"), fractions
 
     @cached_property
-    def _limits(self) -> tuple[Floats, Floats, Ints]:
-        """Least and greatest position and lower neighbour (2, n), in cells, and strides (n,).
-
-        The limits are infinite where the grid wraps.
-        """
-        counts, one = np.array(self.shape), np.ones(len(self.shape))
-        outermost = np.stack([-0.5 * one, counts - 0.5])
-        lowest = np.stack([0.0 * one, np.maximum(counts - 2.0, 0.0)])
-        strides = np.append(np.cumprod(self.shape[::-1])[-2::-1], 1).astype(np.int64)
-        unlimited = np.array([[-np.inf], [np.inf]])
-        return (
-            np.where(self.space.periodic, unlimited, outermost),
-            np.where(self.space.periodic, unlimited, lowest),
-            strides,
-        )
+    def _strides(self) -> Ints:
+        """(n,) how many cells further the next one along a dimension is."""
+        return np.append(np.cumprod(self.shape[::-1])[-2::-1], 1).astype(np.int64)

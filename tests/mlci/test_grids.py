@@ -191,3 +191,10 @@ def test_grid_refuses_a_shift_that_leaves_the_space(offset):
 def test_grid_refuses(shape):
     with pytest.raises(ValueError, match=r"over \('a', 'b'\) needs 2 counts of at least 1, not"):
         Grid(grid_of((6, 5)).space, shape)
+
+
+def test_one_state_alone_has_the_value_that_it_has_among_others():
+    grid = grid_of((6, 5))
+    values, states = np.random.default_rng(4).normal(size=grid.size), random_states(grid, 20)
+    for state, value in zip(states, grid.interpolate(values, states), strict=True):
+        assert grid.interpolate(values, state) == value
