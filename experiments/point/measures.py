@@ -23,7 +23,8 @@ class Measures:
     """What the tabular agent does under the truth, for each of N demonstrations.
 
     Attributes:
-        feasible: (N,) whether it can do the task; NaN stands in the others' measures.
+        feasible: (N,) whether it can do the task; NaN stands in the others' measures. None if
+            `rollouts` is 0, where nothing is measured.
         phi: (N, C) probability that it violates a hypothesis; 0 where not feasible.
         final_state_error: (N,) mean over sampled trajectories, the measure of Fig. 3.
         violation_distance: (N,) equation (11) for each demonstration alone.
@@ -47,6 +48,8 @@ def measure_point(settings: Settings, point: PointInference) -> Measures:
     count = len(point.demonstrations)
     feasible, phi = np.zeros(count, dtype=bool), np.zeros(inference.phi.shape)
     trajectories, controls = {}, []
+    if settings.rollouts == 0:
+        return Measures(feasible, phi, *np.full((4, count), np.nan), trajectories)
     for j, (number, demonstration) in enumerate(
         zip(point.numbers.tolist(), point.demonstrations, strict=True)
     ):

@@ -13,6 +13,7 @@ from pydantic.dataclasses import dataclass
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
+    CountOrNone,
     Positive,
     Seed,
     about,
@@ -103,7 +104,11 @@ class Settings(ModelSettings):
     ranks: RankSettings
     calibration: CalibrationSettings
     rollouts: Annotated[
-        Count, about("sampled policies executed on the true dynamics for each demonstration")
+        CountOrNone,
+        about(
+            "sampled policies executed on the true dynamics for each demonstration; 0 measures "
+            "nothing of the tabular agent under the truth"
+        ),
     ]
     seed: Annotated[Seed, about("of all that is random")]
 
