@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import comb
 
-from mlci.evidence import rank_scores, total_gain
+from mlci.evidence import posterior, rank_scores
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 
 
@@ -70,39 +70,48 @@ def random_subsets(
     return [orders[:, :size] for size in range(1, min(largest, population) + 1)]
 
 
-def truth_ranks(evidence: Floats, truth: Bools, subsets: Ints) -> Floats:
-    """Rank of the truth after the demonstrations of each subset, the measure of Fig. 5.
+def truth_ranks(gains: Floats, truth: Bools) -> Floats:
+    """Rank of the truth by the gains of each of B rankings, the measure of Fig. 5.
 
     Args:
-        evidence: (N, C) log evidence of each demonstration for each hypothesis [nat].
+        gains: (B, C) [nat], such as of random subsets of demonstrations.
         truth: (C,) which hypotheses the true constraint covers; the best ranked one counts.
-        subsets: (B, k) indices of demonstrations.
 
     Returns:
         (B,) ranks from 1; ties share their mean rank. NaN if the truth covers no hypothesis.
     """
     if not np.any(truth):
-        return np.full(len(subsets), np.nan)
-    gain = total_gain(evidence[subsets])
-    return np.asarray(np.min(rank_scores(gain, gain > -np.inf)[:, truth], axis=1))
+        return np.full(len(gains), np.nan)
+    return np.asarray(np.min(rank_scores(gains, gains > -np.inf)[:, truth], axis=1))
 
 
-def top_chances(evidence: Floats, good: Bools, subsets: Ints, top: int) -> Floats:
-    """Whether the `top` best hypotheses of each subset are all good, the measure of Fig. 7.
+def top_chances(gains: Floats, good: Bools, top: int) -> Floats:
+    """Whether the `top` best hypotheses of each ranking are all good, the measure of Fig. 7.
 
     Args:
-        evidence: (N, C) as for `truth_ranks`.
+        gains: (B, C) as for `truth_ranks`.
         good: (C,) which hypotheses count, such as those that overlap the truth.
-        subsets: (B, k) indices of demonstrations.
         top: how many of the best there must be.
 
     Returns:
         (B,) 1 or 0; between them where the last places are tied: the chance that all are good if
         the tie is broken at random.
     """
-    loss = -total_gain(evidence[subsets])
+    loss = -gains
     last = np.sort(loss, axis=1)[:, [top - 1]]
     before, tied = loss < last, loss == last
     places = top - np.sum(before, axis=1)
     fitting, all_ways = (comb(np.sum(part, axis=1), places) for part in (tied & good, tied))
     return np.asarray(np.all(good | ~before, axis=1) * fitting / all_ways)
+
+
+def claims(gains: Floats, prior_none: float) -> Floats:
+    """(B,) posterior probability of the most likely hypothesis of each ranking.
+
+    Beside the share of rankings whose best hypothesis is the truth, it says how sure is too sure.
+
+    Args:
+        gains: (B, C) as for `truth_ranks`.
+        prior_none: prior probability that there is no constraint.
+    """
+    return np.array([np.max(posterior(gain, prior_none)[0]) for gain in gains])

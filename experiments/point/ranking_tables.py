@@ -8,8 +8,9 @@ from scipy.special import expit, logit
 
 from experiments.config.settings import Settings
 from experiments.point.truth_tables import box_table
+from mlci.evidence import total_gain
 from mlci.inference import UNAVOIDABLE, Inference
-from mlci.metrics import random_subsets, top_chances, truth_ranks
+from mlci.metrics import claims, random_subsets, top_chances, truth_ranks
 
 BEST = (1, 2)  # so many of the best hypotheses are compared with the truth, as in Fig. 7
 
@@ -19,7 +20,7 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
 
     Beside the rank of the truth, if there is one, its columns are shares: whether that rank is
     among the first, and whether the best hypothesis, or both of the best two, overlap the truth
-    or lie inside it.
+    or lie inside it; `claim` is the posterior probability of the best.
     """
     hypotheses, constraint = inference.hypotheses, settings.constraint
     truth = hypotheses.inside(constraint)
@@ -28,7 +29,8 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
     ranks, evidence = settings.ranks, inference.evidence
     rows = []
     for subsets in random_subsets(len(inference.names), ranks.demonstrations, ranks.subsets, rng):
-        rank = truth_ranks(evidence, truth, subsets)
+        gains = total_gain(evidence[subsets])
+        rank = truth_ranks(gains, truth)
         in_top = (rank <= ranks.top).astype(int) if truth.any() else np.nan
         rows.append(
             pd.DataFrame(
@@ -39,12 +41,13 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
                     "rank": rank,
                     f"share_top_{ranks.top}": in_top,
                     **{
-                        f"top_{top}_{name}": top_chances(evidence, which, subsets, top)
+                        f"top_{top}_{name}": top_chances(gains, which, top)
                         if top in compared
                         else np.nan
                         for name, which in good.items()
                         for top in BEST
                     },
+                    "claim": claims(gains, inference.prior_none),
                 }
             )
         )

@@ -8,8 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from mlci.evidence import log_evidence, rank_constraints
+from mlci.evidence import log_evidence, rank_constraints, total_gain
 from mlci.metrics import (
+    claims,
     final_state_error,
     random_subsets,
     top_chances,
@@ -57,7 +58,7 @@ def test_random_subsets_are_nested_and_distinct() -> None:
 
 
 def test_a_truth_that_covers_no_hypothesis_has_no_rank() -> None:
-    ranks = truth_ranks(np.array([[0.2, -np.inf]]), np.array([False, False]), np.array([[0]]))
+    ranks = truth_ranks(np.array([[0.2, -np.inf]]), np.array([False, False]))
     assert np.isnan(ranks).tolist() == [True]
 
 
@@ -67,7 +68,7 @@ def test_truth_ranks_equal_ranking_each_subset_alone() -> None:
     violated = rng.random((12, 7)) < 0.05
     truth = np.array([False, True, False, False, True, False, False])
     for subsets in random_subsets(12, 6, 9, rng):
-        ranks = truth_ranks(log_evidence(1 - phi, violated), truth, subsets)
+        ranks = truth_ranks(total_gain(log_evidence(1 - phi, violated)[subsets]), truth)
         alone = [rank_constraints(1 - phi[s], violated[s]).rank[truth].min() for s in subsets]
         np.testing.assert_array_equal(ranks, alone)
 
@@ -75,26 +76,21 @@ def test_truth_ranks_equal_ranking_each_subset_alone() -> None:
 def test_top_chances_by_hand() -> None:
     """After the first demonstration two hypotheses tie; the second refutes one of them."""
     phi, violated = [[0.5, 0.5, 0.2], [0.0, 0.5, 0.5]], [[False] * 3, [True, False, False]]
-    both = np.array([[0], [1]]), np.array([[0, 1]])
+    evidence = log_evidence(1 - np.array(phi), violated)
+    both = [total_gain(evidence[subsets]) for subsets in ([[0], [1]], [[0, 1]])]
     for good, chances in (
         ([True, False, False], [0.5, 0.0, 0.0]),
         ([True, True, False], [1.0, 0.5, 1.0]),
         ([False, False, True], [0.0, 0.5, 0.0]),
     ):
-        found = [
-            top_chances(log_evidence(1 - np.array(phi), violated), np.array(good), each, 1)
-            for each in both
-        ]
+        found = [top_chances(each, np.array(good), 1) for each in both]
         np.testing.assert_allclose(np.concatenate(found), chances)
     for good, chances in (
         ([True, True, False], [1.0, 0.0, 0.0]),
         ([True, False, True], [0.0, 0.0, 0.0]),
         ([False, True, True], [0.0, 1.0, 1.0]),
     ):
-        found = [
-            top_chances(log_evidence(1 - np.array(phi), violated), np.array(good), each, 2)
-            for each in both
-        ]
+        found = [top_chances(each, np.array(good), 2) for each in both]
         np.testing.assert_allclose(np.concatenate(found), chances)
 
 
@@ -122,8 +118,15 @@ def test_top_chances_average_all_ways_to_break_ties(top: int) -> None:
                 merits = [merit(subset, i) for i in range(5)]
                 ranked = [sorted(order, key=merits.__getitem__, reverse=True) for order in orders]
                 expected.append(np.mean([good[best[:top]].all() for best in ranked]))
-            found = top_chances(log_evidence(1 - phi, violated), good, subsets, top)
+            found = top_chances(total_gain(log_evidence(1 - phi, violated)[subsets]), good, top)
             np.testing.assert_allclose(found, expected, atol=1e-12)
             seen += expected
     assert (top == 5) == (max(seen) == 0)
     assert (top == 5) == (len(set(seen)) == 1)
+
+
+def test_claim_is_the_posterior_of_the_best() -> None:
+    """Two hypotheses, of prior 1/4 each beside 1/2 for none; their odds by hand."""
+    gains = np.log([[8.0, 1.0], [1.0, 2.0]])
+    np.testing.assert_allclose(claims(gains, 0.5), [8 / (8 + 1 + 2), 2 / (1 + 2 + 2)])
+    np.testing.assert_allclose(claims(np.array([[-np.inf, 0.0], [np.inf, 0.0]]), 0.5), [1 / 3, 1])
