@@ -23,6 +23,8 @@ from paper_figures import (
     hypothesis_map,
     overview,
     rank_curve,
+    readings,
+    rule_breaking,
     sampled_trajectories,
     start_points,
     state_space,
@@ -30,6 +32,7 @@ from paper_figures import (
     success_cases,
     time_and_memory,
     violation_distance,
+    wrong_model,
 )
 from paper_figures.rows import Unsuited
 from paper_figures.style import save
@@ -53,6 +56,9 @@ FIGURES: Mapping[str, ModuleType] = {
         start_points,
         time_and_memory,
         choice_effects,
+        readings,
+        wrong_model,
+        rule_breaking,
         success,
         success_cases,
     )

@@ -8,7 +8,7 @@ import pandas as pd
 from experiments.config.settings import Settings
 from experiments.point.belief_counts import belief_counts
 from experiments.point.inference import PointInference
-from experiments.point.measures import Measures
+from experiments.point.measures import Measures, rare_demonstrations
 from experiments.point.ranking_tables import rank_table, ranking_table
 from experiments.point.streams import Purpose, stream
 from experiments.point.trajectory_tables import (
@@ -60,6 +60,8 @@ def point_tables(
         **truth_tables(settings, point.trials, point.numbers),
         "summary": _summary_table(settings, point, measures, ranks),
     }
+    if settings.misfit:
+        tables["trials"]["rare"] = rare_demonstrations(settings, point)
     if settings.calibration.sets:
         tables["calibration"] = belief_counts(settings, point)
     return tables

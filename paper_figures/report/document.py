@@ -16,7 +16,10 @@ from paper_figures.report import (
     section_choices,
     section_costs,
     section_origin,
+    section_readings,
+    section_rule_breaking,
     section_start_points,
+    section_wrong_model,
 )
 from paper_figures.report.markdown import figure, table
 from paper_figures.report.study_tables import Missing, Results, absent
@@ -62,6 +65,25 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         (
             Figure("sensitivity", "choice_effects_c1", "One choice changed at a time, truth C1."),
             Figure("sensitivity", "choice_effects_c2", "One choice changed at a time, truth C2."),
+        ),
+    ),
+    (
+        "Readings of the paper: claims 1 and 4 together",
+        section_readings.section,
+        (Figure("readings", "readings", "Pairs kept, and truths found, under each reading."),),
+    ),
+    (
+        "Demonstrators who ignore the constraint",
+        section_rule_breaking.section,
+        (Figure("rule_breaking", "rule_breaking", "Rank of the truth where some break the rule."),),
+    ),
+    (
+        "Demonstrators who are not the nominal model",
+        section_wrong_model.section,
+        (
+            Figure(
+                "wrong_model", "wrong_model", "What a wrong model of demonstrators does to answers."
+            ),
         ),
     ),
     (

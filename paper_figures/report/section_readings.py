@@ -28,9 +28,7 @@ def judged_readings(results: Results) -> pd.DataFrame:
     except Unsuited as error:
         raise Missing(STUDY, f"the study `{STUDY}` has {error}") from None
     shares = [share(kept, pairs) for kept, pairs in zip(rows["kept"], rows["pairs"], strict=True)]
-    texts = [
-        between(percent(each.value), percent(each.low), percent(each.high)) for each in shares
-    ]
+    texts = [between(percent(each.value), percent(each.low), percent(each.high)) for each in shares]
     return rows.assign(
         kept_text=texts,
         keeps=[each.low <= PAPER_KEPT <= each.high for each in shares],

@@ -110,6 +110,13 @@ class Settings(ModelSettings):
             "nothing of the tabular agent under the truth"
         ),
     ]
+    misfit: Annotated[
+        CountOrNone,
+        about(
+            "trajectories of the tabular model that each demonstration is compared with, to tell "
+            "whether it is nearly impossible there; 0 compares none"
+        ),
+    ]
     seed: Annotated[Seed, about("of all that is random")]
 
     @cached_property

@@ -79,6 +79,7 @@ CHANGES = {
     "calibration.sets": ("truth=none calibration.sets=3", TRUTH),  # with another truth, see there
     "calibration.demonstrations": ("calibration.demonstrations=[1]", NOTHING),
     "rollouts": ("rollouts=3", NOTHING),
+    "misfit": ("misfit=99", NOTHING),
     "seed": ("seed=1", REAL),
 }
 
