@@ -11,6 +11,8 @@ from experiments.point.truth_tables import box_table
 from mlci.evidence import total_gain
 from mlci.inference import UNAVOIDABLE, Inference
 from mlci.metrics import claims, random_subsets, top_chances, truth_ranks
+from mlci.rule_breaking import gains_of_subsets
+from mlci.spaces import Floats, Ints
 
 BEST = (1, 2)  # so many of the best hypotheses are compared with the truth, as in Fig. 7
 
@@ -26,10 +28,10 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
     truth = hypotheses.inside(constraint)
     good = {"overlap": hypotheses.overlaps(constraint), "inside": truth}
     compared = [top for top in BEST if top <= len(hypotheses)] if len(constraint) else []
-    ranks, evidence = settings.ranks, inference.evidence
+    ranks = settings.ranks
     rows = []
     for subsets in random_subsets(len(inference.names), ranks.demonstrations, ranks.subsets, rng):
-        gains = total_gain(evidence[subsets])
+        gains = _gains(inference, subsets)
         rank = truth_ranks(gains, truth)
         in_top = (rank <= ranks.top).astype(int) if truth.any() else np.nan
         rows.append(
@@ -52,6 +54,19 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
             )
         )
     return pd.concat(rows, ignore_index=True)
+
+
+def _gains(inference: Inference, subsets: Ints) -> Floats:
+    """Gains (B, C) of subsets (B, k); a rate of rule breaking that is estimated is so from each."""
+    if inference.rule_breaking is None:
+        return total_gain(inference.evidence[subsets])
+    return gains_of_subsets(
+        inference.forecast,
+        inference.violated,
+        subsets,
+        inference.rates.model_error,
+        inference.prior_none,
+    )
 
 
 def ranking_table(inference: Inference) -> pd.DataFrame:
