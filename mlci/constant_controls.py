@@ -32,6 +32,7 @@ from mlci.reachability import SafeSet
 from mlci.regions import Regions
 from mlci.simulate import rk4_step, step_count
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace, middle_and_half
+from mlci.system_check import check_affine
 from mlci.systems import System
 
 _AT_ONCE = 1 << 14  # states; more do not stay in the cache
@@ -91,7 +92,11 @@ def tabulate_escapes(
         grid: where v is computed.
         constraints: K.
         horizon: for how long the motions last [s].
+
+    Raises:
+        ValueError: dynamics that are not affine in the control, where u* is no corner of its box.
     """
+    check_affine(system)
     step = _step_for(system, grid, constraints, horizon)
     return SafeSet.from_values(grid, escape_value(system, constraints, grid.centers, horizon, step))
 

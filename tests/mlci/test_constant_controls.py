@@ -12,7 +12,7 @@ from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
 from mlci.simulate import rk4_step
 from mlci.spaces import Box, StateSpace
-from mlci.systems import Pendulum, System, TelescopingPendulum
+from mlci.systems import FunctionSystem, Pendulum, System, TelescopingPendulum
 
 FREE = np.inf
 TELESCOPE = TelescopingPendulum()
@@ -256,3 +256,16 @@ def test_a_step_serves_any_horizon():
 def test_a_step_that_does_not_divide_the_horizon_is_refused():
     with pytest.raises(ValueError, match=r"0\.3 s does not divide the horizon of 5\.0 s"):
         escape_value(TELESCOPE, PAIN, np.zeros((1, 4)), 5.0, 0.3)
+
+
+def test_dynamics_that_are_not_affine_in_the_control_are_refused():
+    # Their best control need not be a corner of the control box.
+    space = StateSpace(Box([-1, -1], [1, 1]), np.zeros(2, dtype=bool), ("x", "v"))
+
+    def rates(states, controls):
+        return states[..., 1], np.cos(3 * controls[..., 0])
+
+    system = FunctionSystem(rates, space, Box([-2], [2]))
+    wall = Regions(space, [[0.5, -FREE]], [[1.0, FREE]])
+    with pytest.raises(ValueError, match="dynamics is not affine"):
+        tabulate_escapes(system, Grid(space, (5, 5)), wall, horizon=1.0)
