@@ -194,7 +194,7 @@ def calibrate_on(
         return Calibration(tried, used)
     alpha = prepared.avoidance[can]
     crossed = np.stack([regions.violated_by(path.states) for path in demonstrations])[can]
-    open_pairs = ~certain_by_ends(regions, tasks)[can]
+    open_pairs = ~(certain_by_ends(regions, tasks) | prepared.decided_by_cell)[can]
     counts = open_pairs & is_possible(alpha)
     if not (counts[:half].any() and counts[half:].any()):
         return Calibration(tried, used)

@@ -85,6 +85,19 @@ def belief_tables() -> dict[str, pd.DataFrame]:
     return {"reliability": pd.DataFrame(rows)}
 
 
+def forecast_tables() -> dict[str, pd.DataFrame]:
+    """Two kinds of forecasts; a bin of few."""
+    rows, rng = [], np.random.default_rng(4)
+    for kind in (0, 1):
+        for lower, upper, count in ((0.0, 0.01, 500), (0.1, 0.2, 20), (0.4, 0.5, 19), (0.9, 1, 60)):
+            low, crossed, high = np.sort(rng.random(3))
+            row = {"map": kind, "lower": lower, "upper": upper, "count": count}
+            row |= {"forecast": rng.uniform(lower, upper), "crossed": crossed}
+            row |= {"low": low, "high": high, "log_score": -0.4, "brier": 0.12 - 0.01 * kind}
+            rows.append({**row, "off_by": 0.09 - 0.08 * kind})
+    return {"forecasts": pd.DataFrame(rows)}
+
+
 # The case of a name, with what it changes of the default's settings.
 SUCCESS_CASES = {
     "default": {},
@@ -177,6 +190,7 @@ def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
         "choice_effects": choice_effect_tables(),
         "start_points": start_point_tables(),
         "calibration_diagram": belief_tables(),
+        "forecast_diagram": forecast_tables(),
         "success": success_tables(),
         "success_cases": success_tables(),
     }

@@ -16,6 +16,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.collate.cases import case_names, case_table
+from experiments.collate.evidence_kinds import evidence_kinds
 from experiments.collate.examples import example_tables
 from experiments.collate.finished import CollateError, FinishedPoint
 from experiments.collate.intervals import study_tables
@@ -113,6 +114,8 @@ def _made_tables(
     made = {**example_tables(points, examples, names, log), **study_tables(joined)}
     if "calibration" in joined:
         made["reliability"] = reliability(pd.read_csv(joined["calibration"]))
+    if "evidence" in joined:
+        made["evidence_kinds"] = evidence_kinds(pd.read_csv(joined["evidence"]))
     cases = case_table(joined["summary"], [point.identity for point in points], names)
     return made if cases is None else {**made, "cases": cases}
 

@@ -39,9 +39,9 @@ def reliability(calibration: pd.DataFrame) -> pd.DataFrame:
     calibration = calibration.assign(world=calibration["truth"].astype(str))
     rows = []
     for key, group in calibration.groupby([*opening, *_OF_ROWS], sort=True, dropna=False):
-        group = _weighted(group)
+        group = weighted(group)
         sets = np.asarray(group.groupby(["world", LAST_OPENING, "set"]).ngroup(), dtype=np.int64)
-        counts = _set_resamples(group, sets, [str(part) for part in key])
+        counts = set_resamples(group, sets, [str(part) for part in key])
         total = np.sum(group["weight"] * group["count"])
         for number in np.unique(group["bin"]):
             inside = (group["bin"] == number).to_numpy()
@@ -78,14 +78,14 @@ def _bin_row(number: int, rows: pd.DataFrame, counts: Floats, total: float) -> d
     }
 
 
-def _weighted(group: pd.DataFrame) -> pd.DataFrame:
-    """The rows, each with the weight of its set."""
+def weighted(group: pd.DataFrame) -> pd.DataFrame:
+    """The rows, each with the `weight` of its set: its world's prior by the world's sets."""
     of_seed = group.drop_duplicates(["world", LAST_OPENING])
     sets = of_seed.groupby("world")["sets"].sum()
     return group.assign(weight=group["prior"] / group["world"].map(sets))
 
 
-def _set_resamples(group: pd.DataFrame, sets: Ints, key: list[str]) -> Floats:
+def set_resamples(group: pd.DataFrame, sets: Ints, key: list[str]) -> Floats:
     """(B, N) how often each of N sets is in each resample."""
     of_set = group.assign(number=sets).drop_duplicates("number").sort_values("number")
     without = (of_set["world"] == NO_TRUTH).to_numpy()

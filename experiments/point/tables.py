@@ -7,6 +7,8 @@ import pandas as pd
 
 from experiments.config.settings import Settings
 from experiments.point.belief_counts import belief_counts
+from experiments.point.evidence_kinds import evidence_table
+from experiments.point.forecasts import forecast_table
 from experiments.point.inference import PointInference
 from experiments.point.measures import Measures, rare_demonstrations
 from experiments.point.ranking_tables import rank_table, ranking_table
@@ -35,7 +37,8 @@ def point_tables(
         row a hypothesis, ranked with all of them, and `first`, with the first FIRST of them;
         `summary`, one row; `sampled`, `violations`, `moves` and `probabilities`, of single
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
-        `dimensions` of the state, and `regions` of the truth. If asked for, `calibration`.
+        `dimensions` of the state, and `regions` of the truth. If asked for, `calibration`, and
+        `evidence` and `forecasts` where these are calibrated.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -64,6 +67,9 @@ def point_tables(
         tables["trials"]["rare"] = rare_demonstrations(settings, point)
     if settings.calibration.sets:
         tables["calibration"] = belief_counts(settings, point)
+        if point.calibration is not None and settings.inference.exact_ends:
+            tables["evidence"] = evidence_table(settings, point, point.calibration)
+            tables["forecasts"] = forecast_table(point.calibration)
     return tables
 
 

@@ -14,6 +14,7 @@ from mlci.spaces import Ints, StateSpace
 TRUTH_TABLES = {
     "attempts": ("truth", "seed"),
     "dimensions": ("truth",),
+    "forecasts": ("cells", "actions", "dt", "samples"),
     "paths": ("truth", "seed"),
     "regions": ("truth",),
 }

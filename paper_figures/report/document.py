@@ -15,6 +15,7 @@ from paper_figures.report import (
     section_beliefs,
     section_choices,
     section_costs,
+    section_evidence,
     section_origin,
     section_readings,
     section_rule_breaking,
@@ -90,6 +91,11 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         "Calibration of the posterior",
         section_beliefs.section,
         (Figure("calibration", "calibration_diagram", "Share that is right against probability."),),
+    ),
+    (
+        "Evidence, and forecasts that come true",
+        section_evidence.section,
+        (Figure("calibration", "forecast_diagram", "Share that is crossed against its forecast."),),
     ),
     (
         "In-cell sampling at 100 cells",

@@ -51,7 +51,8 @@ def test_the_map_is_fitted_on_all_and_judged_on_the_second_half(model: TabularMo
     half = int(can.sum()) // 2
     alpha, sizes = prepared.avoidance[can], region_sizes(model.regions)
     crossed = np.stack([model.regions.violated_by(path.states) for path in shuffled])[can]
-    counts = is_possible(alpha) & ~certain_by_ends(model.regions, prepared.tasks)[can]
+    certain = certain_by_ends(model.regions, prepared.tasks) | prepared.decided_by_cell
+    counts = is_possible(alpha) & ~certain[can]
     assert (calibration.tried, calibration.used) == (60, int(can.sum()))
     assert calibration.map == fit_map(alpha, crossed, sizes, counts)
     assert calibration.before is not None

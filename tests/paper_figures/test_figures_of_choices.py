@@ -15,6 +15,7 @@ from choice_studies import (
     SUCCESS_CASES,
     belief_tables,
     choice_effect_tables,
+    forecast_tables,
     start_point_tables,
 )
 from matplotlib.axes import Axes
@@ -26,6 +27,7 @@ from matplotlib.figure import Figure
 from paper_figures import (
     calibration_diagram,
     choice_effects,
+    forecast_diagram,
     start_points,
     success,
     success_cases,
@@ -229,6 +231,22 @@ def test_calibration_says_what_is_right() -> None:
     assert f"  model, printed, 1: {said}" in lines
     with pytest.raises(Unsuited, match="rows differ in more than source, demonstrations, belief"):
         calibration_diagram.draw(pd.concat([table, table]))
+
+
+def test_forecasts_are_drawn_before_and_after_the_map(drawn: Drawn) -> None:
+    (table,) = forecast_tables().values()
+    (axes,) = drawn(forecast_diagram).axes
+    for kind, label in ((0, "Phi of the tabular model"), (1, "calibrated, other tasks")):
+        bins = table.query(f"map == {kind} and count >= 20")
+        assert len(bins) == 3
+        expected = 100 * bins[["forecast", "crossed", "low", "high"]].to_numpy()
+        np.testing.assert_allclose(bars(axes, label), expected)
+    said = forecast_diagram.facts(table).splitlines()[-1]
+    assert "calibrated, other tasks: 599 pairs, off by 0.010, Brier score 0.1100" in said
+    with pytest.raises(Unsuited, match="could not do enough tasks"):
+        forecast_diagram.draw(table.iloc[:0])
+    with pytest.raises(Unsuited, match="more than map, lower"):
+        forecast_diagram.draw(pd.concat([table, table]))
 
 
 def of_default(table: pd.DataFrame, crossing: bool) -> pd.DataFrame:

@@ -26,6 +26,7 @@ from paper_figures.report import (
     section_beliefs,
     section_choices,
     section_costs,
+    section_evidence,
     section_start_points,
 )
 from paper_figures.report.document import report
@@ -364,6 +365,28 @@ def test_calibration_counts_bins_that_agree(tmp_path: Path) -> None:
     # Two thirds of the probabilities at 0.2 and one at 0.8: 0.4; right 1/3; off 0.1 and 0.4: 0.2.
     assert "| 3 | 0.400 | 0.333 | 0.200 | 1 of 2 | 25 % |" in text
     assert "most likely one, exact posterior" in text
+
+
+def test_evidence_is_compared_and_judged(tmp_path: Path) -> None:
+    scores = dict.fromkeys(section_evidence.SCORES, 0.02)
+    rows = [
+        {"demonstrations": size, "evidence": kind, "worlds": 120, "sets": 200, "best": 0.1}
+        | {"right": right}
+        | {f"{name}{end}": value for name, value in scores.items() for end in ("", "_low", "_high")}
+        for size, right in ((5, 0.1), (10, 0.1), (20, 0.3))
+        for kind in ("paper", "calibrated")
+    ]
+    table = pd.DataFrame(rows)
+    write(tmp_path, "calibration", evidence_kinds=table)
+    text = section_evidence.section(Results(tmp_path))
+    line = "| calibrated | 5 | 0.100 | 0.100 | 0.020 [0.020, 0.020] |"
+    assert line in text
+    assert "off by 0.0200 after 5, 0.0200 after 10 demonstrations, within 0.05." in text
+    assert "After 20 it is too modest (0.100 probable, 0.300 right)" in text
+    table.loc[table["demonstrations"] == 10, "off_by"] = 0.07
+    write(tmp_path / "worse", "calibration", evidence_kinds=table)
+    worse = section_evidence.section(Results(tmp_path / "worse"))
+    assert "0.0700 after 10 demonstrations, not within 0.05." in worse
 
 
 def test_times_are_in_units_that_suit_them(tmp_path: Path) -> None:
