@@ -86,7 +86,7 @@ def _beliefs(inference: Inference, truth: Bools) -> Iterator[tuple[str, Floats, 
     best = int(ranking.order[0])
     if not ranking.feasible[best]:
         return
-    right, avoidance = truth[[best]], inference.avoidance[:, best]
+    right, avoidance = truth[[best]], inference.forecast[:, best]
     yield "selected", ranking.posterior[[best]], right
     yield "corrected", np.array([confidence(prior, avoidance)]), right
     yield "printed", np.array([printed_confidence(prior, avoidance)]), right

@@ -1,0 +1,80 @@
+"""Kinds of evidence of one world, each against the inference that it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from tiny_point import TINY, composed
+
+from experiments.config.read import read_config
+from experiments.config.settings import Settings
+from experiments.point.evidence_kinds import evidence_table
+from experiments.point.inference import PointInference, infer_point
+from experiments.tracking.store import Store
+from mlci.evidence import PAPER, Rates
+from mlci.inference import Inference
+from mlci.preparation import infer
+
+WORLD = [
+    *("system=double_integrator", "truth=cell", "truth.cell=6", "inference=calibrated"),
+    *("demonstrations.pairs=12", "demonstrations.keep=8", "calibration.sets=1"),
+    *("calibration.demonstrations=[2,3]", "tasks.lower=[-1.0,-0.5]", "tasks.upper=[1.0,0.5]"),
+]
+
+
+@pytest.fixture(scope="module")
+def settings() -> Settings:
+    tiny = [
+        word for word in TINY if not word.startswith(("truth", "inference", "demonstrations.p"))
+    ]
+    return read_config(composed(*(word for word in tiny if "keep" not in word), *WORLD))[0]
+
+
+@pytest.fixture(scope="module")
+def point(settings: Settings, tmp_path_factory: pytest.TempPathFactory) -> PointInference:
+    return infer_point(settings, Store(tmp_path_factory.mktemp("store")))
+
+
+@pytest.fixture(scope="module")
+def table(settings: Settings, point: PointInference) -> pd.DataFrame:
+    assert point.calibration is not None
+    return evidence_table(settings, point, point.calibration)
+
+
+def inferred(point: PointInference, kind: str) -> Inference:
+    """The inference of a kind, from the library."""
+    exact = kind != "paper"
+    rate = float(kind.rpartition(" ")[2]) if kind.startswith("model error") else 0.0
+    calibrated = kind == "calibrated" and point.calibration is not None
+    return infer(
+        point.model,
+        point.demonstrations,
+        hypotheses=point.hypotheses,
+        rates=Rates(rate) if rate else PAPER,
+        calibration=point.calibration.map if calibrated and point.calibration else None,
+        exact_ends=exact,
+        tolerance=np.inf,
+    )
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["paper", "exact ends", "model error 0.05", "model error 0.1", "model error 0.2", "calibrated"],
+)
+def test_each_kind_is_an_inference(kind: str, table: pd.DataFrame, point: PointInference) -> None:
+    whole = inferred(point, kind)
+    rows = table[table["evidence"] == kind]
+    sets = len(point.demonstrations) // 3
+    assert sets >= 1
+    assert len(rows) == 2 * sets
+    for _, row in rows.iterrows():
+        first = 3 * row["set"]
+        part = whole.of(slice(first, first + row["demonstrations"]))
+        best = int(part.order[0])
+        assert row["best"] == pytest.approx(part.posterior[best])
+        assert row["right"] == (best == 6)
+        assert row["of_truth"] == pytest.approx(part.posterior[6])
+        assert row["top"] == (part.ranking.rank[6] <= 5)
+        assert row["feasible"] == part.ranking.feasible.sum()
+        assert (row["prior"], row["sets"]) == (0.5 / 10, sets)
