@@ -27,7 +27,7 @@ from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.recursions import reachable_cells
 from mlci.spaces import Bools, Floats
-from mlci.tabular import action_grid, discretize
+from mlci.tabular import discretize
 
 _SAMPLES = 100  # of the paths that show which tasks can be done
 # A remedy that takes more moves is not tried: some 30 s and 1 GB.
@@ -248,7 +248,7 @@ def _try(
 
 def _actions(settings: AdviceSettings) -> Floats:
     """(A, m) the actions."""
-    return action_grid(settings.model, settings.action_counts)
+    return settings.action_values
 
 
 _HEAD = (

@@ -37,7 +37,7 @@ from mlci.inference import Inference
 from mlci.maxent import ROUNDED_TIMES
 from mlci.recordings.read import Problem, read_demonstrations
 from mlci.simulate import step_count
-from mlci.tabular import TabularModel, action_grid, discretize
+from mlci.tabular import TabularModel, discretize
 from paper_figures import hypothesis_map
 from paper_figures.style import save
 
@@ -132,7 +132,7 @@ def _tabular_model(settings: RecordedSettings) -> TabularModel:
     return discretize(
         settings.model,
         settings.cells,
-        action_grid(settings.model, settings.action_counts),
+        settings.action_values,
         settings.dt,
         settings.candidates,
         settings.transition.samples,

@@ -30,7 +30,7 @@ from mlci.grids import Grid
 from mlci.merged_moves import MergedMoves, merge_moves
 from mlci.regions import Regions, as_mask
 from mlci.simulate import rollout
-from mlci.spaces import Bools, Floats, Ints
+from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.systems import System
 
 _CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the curve it stands for
@@ -159,18 +159,26 @@ class TabularModel:
         return constrained
 
 
-def action_grid(system: System, counts: int | Sequence[int]) -> Floats:
+def action_grid(
+    system: System, counts: int | Sequence[int], action_range: Box | None = None
+) -> Floats:
     """(A, m) actions evenly spaced over the control box, its ends included (section IV-B).
 
     Args:
         system: gives the control box.
         counts: number of values of each control, or one number for all; a single value is the
             middle of its range.
+        action_range: takes the place of the control box: the control noise of the tabular agent
+            depends on it, see `mlci.diagnosis`.
 
     Raises:
-        ValueError: a count below 1, or a list of the wrong length.
+        ValueError: a count below 1, or a list or a range of the wrong length.
     """
-    box = system.control_box
+    box = system.control_box if action_range is None else action_range
+    if box.dimension != system.control_box.dimension:
+        raise ValueError(
+            f"{system.control_box.dimension} controls need as many ranges, not {box.dimension}"
+        )
     values = np.broadcast_to(counts, box.dimension) if np.ndim(counts) == 0 else np.array(counts)
     if values.shape != (box.dimension,) or values.dtype.kind not in "iu" or np.min(values) < 1:
         raise ValueError(

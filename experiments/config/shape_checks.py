@@ -97,6 +97,12 @@ def _subject_problems(settings: SubjectSettings) -> Iterator[str]:
         yield from _length_problems("hypotheses.shape", settings.hypotheses.shape, space)
     if not isinstance(settings.actions, int) and len(settings.actions) != controls:
         yield f"actions: {list(settings.actions)} must be one number, or a list of {controls}"
+    ranges = settings.action_range
+    if ranges is not None and (len(ranges) != controls or any(low >= high for low, high in ranges)):
+        yield (
+            f"action_range: {[list(ends) for ends in ranges]} must be {controls} pairs, each of a "
+            "lower and a higher value"
+        )
     for i, region in enumerate(settings.hypotheses.boxes):
         yield from _region_problems(f"hypotheses.boxes[{i}]", region, space)
     if settings.hypotheses.shape is None and not settings.hypotheses.boxes:

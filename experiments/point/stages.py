@@ -24,7 +24,7 @@ from mlci.grids import Grid
 from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
 from mlci.systems import System
-from mlci.tabular import TabularModel, action_grid, discretize
+from mlci.tabular import TabularModel, discretize
 
 # What is stored of a tabular model: its own arrays, and those of the sparse matrix of crossings.
 _MOVES = ("successor", "reward", "allowed")
@@ -79,7 +79,7 @@ def tabular_model(settings: Settings, store: Store) -> TabularModel:
     return TabularModel(
         system=settings.model,
         grid=settings.cells,
-        actions=action_grid(settings.model, settings.action_counts),
+        actions=settings.action_values,
         dt=settings.dt,
         regions=hypotheses.joined(truth),
         crosses=sparse.hstack(crosses, format="csr"),
@@ -94,6 +94,7 @@ def model_inputs(settings: ModelSettings, regions: Regions) -> tuple[Any, ...]:
         settings.system,
         settings.grid,
         settings.action_counts,
+        settings.action_range,
         settings.dt,
         settings.transition.samples,
         settings.temperature,
@@ -110,7 +111,7 @@ def _discretized(
         model = discretize(
             settings.model,
             settings.cells,
-            action_grid(settings.model, settings.action_counts),
+            settings.action_values,
             settings.dt,
             regions,
             settings.transition.samples,

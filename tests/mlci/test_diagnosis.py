@@ -7,6 +7,7 @@ from mlci.diagnosis import Diagnosis, diagnose
 from mlci.effort import WithEffort
 from mlci.grids import Grid
 from mlci.regions import Regions
+from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator, Pendulum
 from mlci.tabular import action_grid, discretize
 
@@ -86,7 +87,11 @@ def test_control_noise_is_less_where_actions_end_early(count: int, dt: float, no
 
 def test_control_noise_with_wide_actions_is_that_of_the_continuum() -> None:
     """25 actions in +-6, and at another temperature; a reward that does not bound the control."""
-    system, wide = Pendulum(), np.linspace(-6, 6, 25)[:, None]
+    system = Pendulum()
+    wide = action_grid(system, 25, Box([-6.0], [6.0]))
+    np.testing.assert_array_equal(wide[:, 0], np.linspace(-6, 6, 25))
+    with pytest.raises(ValueError, match="1 controls need as many ranges, not 2"):
+        action_grid(system, 5, Box([-1.0, -1.0], [1.0, 1.0]))
     grid, regions = Grid(system.space, (4, 4)), Regions.from_grid(system.space, (2, 2))
     for dt in (0.1, 0.2, 0.25, 0.5, 1.0):
         (noise,) = diagnose(discretize(system, grid, wide, dt, regions)).noise

@@ -7,13 +7,14 @@ from functools import cached_property
 from typing import Annotated
 
 import numpy as np
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
     CountOrNone,
+    Number,
     Positive,
     Seed,
     about,
@@ -37,7 +38,9 @@ from experiments.config.settings.system import SystemSettings, read_system
 from mlci.effort import WithEffort
 from mlci.grids import Grid
 from mlci.regions import Regions
+from mlci.spaces import Box, Floats
 from mlci.systems import System
+from mlci.tabular import action_grid
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -53,6 +56,13 @@ class SubjectSettings:
         one_or_list(Count, Shape),  # type: ignore[valid-type]
         about("actions, evenly spaced over the control box; a list gives a number each control"),
     ]
+    action_range: Annotated[
+        tuple[Annotated[tuple[Number, ...], Field(min_length=2, max_length=2)], ...] | None,
+        about(
+            "first and last action of each control in place of the control box; null takes that",
+            "of the control",
+        ),
+    ]
     hypotheses: HypothesesSettings
 
     @cached_property
@@ -64,6 +74,14 @@ class SubjectSettings:
     def candidates(self) -> Regions:
         """The hypotheses."""
         return self.hypotheses.regions(self.model.space)
+
+    @property
+    def action_values(self) -> Floats:
+        """(A, m) the actions."""
+        if self.action_range is None:
+            return action_grid(self.model, self.action_counts)
+        lower, upper = np.array(self.action_range).T
+        return action_grid(self.model, self.action_counts, Box(lower, upper))
 
     @property
     def action_counts(self) -> tuple[int, ...]:

@@ -104,7 +104,9 @@ def changed(value: Any) -> Iterator[Any]:
 
 
 def test_every_setting_changes_identity() -> None:
-    settings, _ = read_config(composed("safety.margin=0.1", "truth=cell", "truth.cell=5"))
+    settings, _ = read_config(
+        composed("safety.margin=0.1", "truth=cell", "truth.cell=5", "action_range=[[-3,3]]")
+    )
     boxes = (Region((0.0, None), (1.0, None)),)
     truth = dataclasses.replace(settings.truth, boxes=boxes)
     hypotheses = dataclasses.replace(settings.hypotheses, boxes=boxes)
@@ -156,6 +158,8 @@ VALUES = [
     ("dt=???", "dt: missing; give it a value"),
     ("~dt", "dt: missing; give it a value"),
     ("dt=0", "dt: 0.0 must be above 0"),
+    ("action_range=[[2,1]]", "action_range: [[2.0, 1.0]] must be 1 pairs, each of a lower and"),
+    ("action_range=[[-1,1],[-1,1]]", "action_range: [[-1.0, 1.0], [-1.0, 1.0]] must be 1 pairs"),
     ("inference.rule_breaking=1", "inference.rule_breaking: 1.0 must be below 1"),
     ("inference.rule_breaking=guess", "inference.rule_breaking: 'guess' is not a finite number"),
     ("dt=0.3", "dt: 0.3 does not cut the horizon 5.0 into whole steps; try 0.25 or 0.3125"),

@@ -31,6 +31,7 @@ CHANGES = {
     "system.arguments.drag": ("system.drag=0.1", ALL),
     "system.arguments.mass": ("system.mass=2.0", ALL),
     "actions": ("actions=5", MODEL),
+    "action_range": ("action_range=[[-6.0,6.0]]", MODEL),
     "hypotheses.shape": ("hypotheses.shape=[10,20]", {"mdp", "forecasts"}),
     "hypotheses.boxes": (f"hypotheses.boxes={BOX}", {"mdp", "forecasts"}),
     "grid.shape": ("grid.shape=[6,7]", MODEL),
