@@ -31,7 +31,7 @@ _COLUMNS = {
 _PANELS = {
     "rank": ("median rank", "rank of truth", 1),
     "top": ("truth in the top 5", "sets [%]", 100),
-    "claim": ("best: claimed (hollow), right", "[%]", 100),
+    "claim": ("claimed (hollow), right", "[%]", 100),
     RARE: ("nearly impossible", "demonstrations [%]", 100),
 }
 

@@ -57,6 +57,7 @@ def section(results: Results) -> str:
 def _limits(rows: pd.DataFrame) -> str:
     """Where the truth is lost, where the best claims too much, and whether a warning fires."""
     lost, sure, fires = (_named(rows[rows[name]]) for name in ("lost", "sure", "fires"))
+    fires = "in all of them" if rows["fires"].all() else fires
     silent = _named(rows[(rows["lost"] | rows["sure"]) & ~rows["fires"]])
     of_default = rows.loc[rows["case"] == DEFAULT, RARE].mean()
     return (
