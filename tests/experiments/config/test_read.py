@@ -94,7 +94,7 @@ def changed(value: Any) -> Iterator[Any]:
     elif isinstance(value, bool):
         yield not value
     elif isinstance(value, str):
-        yield {"equation": "escapes", "euler": "rk4"}.get(value, f"{value}2")
+        yield {"equation": "escapes", "euler": "rk4", "rk4": "euler"}.get(value, f"{value}2")
     elif isinstance(value, tuple):
         yield value[:-1] if len(value) > 1 else value * 2
     elif value is None:
@@ -104,9 +104,12 @@ def changed(value: Any) -> Iterator[Any]:
 
 
 def test_every_setting_changes_identity() -> None:
-    settings, _ = read_config(
-        composed("safety.margin=0.1", "truth=cell", "truth.cell=5", "action_range=[[-3,3]]")
-    )
+    of_reality = [
+        "reality.system={length: 1.2}", "reality.effort=[0,0.1,0.1]", "reality.iterations=3",
+        "reality.integrator=rk4", "reality.control_noise=[0.1]", "reality.sensor_noise=[0.1,0.1]",
+    ]  # fmt: skip
+    words = ["safety.margin=0.1", "truth=cell", "truth.cell=5", "action_range=[[-3,3]]"]
+    settings, _ = read_config(composed(*words, *of_reality))
     boxes = (Region((0.0, None), (1.0, None)),)
     truth = dataclasses.replace(settings.truth, boxes=boxes)
     hypotheses = dataclasses.replace(settings.hypotheses, boxes=boxes)
