@@ -39,7 +39,8 @@ def section(results: Results) -> str:
     ]
     return (
         "Each demonstrator ignores the constraint with some probability. Inference is that of "
-        "`infer`. Where nobody is taken to (eps 0), a single violation excludes a hypothesis for ever; with "
+        "`infer`. Where nobody is taken to (eps 0), a single violation excludes a hypothesis for "
+        "ever; with "
         f"eps estimated, each set of {size} demonstrations is given the rate that makes it most "
         f"likely. Median rank of the truth where {percent(ASKED)} break the rule: "
         f"{'; '.join(verdicts)}. Who ignores the constraint need not enter the truth: most tasks "
