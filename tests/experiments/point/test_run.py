@@ -20,7 +20,7 @@ WORDS = ["truth=wall", "horizon=4.0", "dt=0.5", "actions=3", "grid.shape=[16,8]"
 WORDS += ["safety.shape=[41,21]", "demonstrations.pairs=14", "demonstrations.keep=11"]
 WORDS += ["demonstrations.restarts=1", "demonstrations.dt=0.05", "demonstrations.clip=true"]
 WORDS += ["ranks.demonstrations=10", "ranks.subsets=6"]
-WORDS += ["ranks.top=3", "rollouts=2"]
+WORDS += ["ranks.top=4", "rollouts=2"]
 
 
 @pytest.fixture(scope="module")
@@ -46,14 +46,14 @@ def test_the_summary_is_of_the_other_tables(point: tuple) -> None:
         assert row[name] == pytest.approx(trials[name].mean(), rel=1e-12)
     after = ranks[ranks["demonstrations"] == PAPER_SIZE]
     assert row["rank_after_9"] == after["rank"].median()
-    assert row["share_top_3_after_9"] == (after["rank"] <= 3).mean()
+    assert row["share_top_4_after_9"] == (after["rank"] <= 4).mean()
 
 
 def test_ranks_are_in_the_top_up_to_the_last_place(point: tuple) -> None:
     """A rank of exactly `ranks.top` counts."""
     ranks = point[1]["ranks"]
-    assert (ranks["rank"] == 3).any()
-    np.testing.assert_array_equal(ranks["share_top_3"], (ranks["rank"] <= 3).astype(int))
+    assert (ranks["rank"] == 4).any()
+    np.testing.assert_array_equal(ranks["share_top_4"], (ranks["rank"] <= 4).astype(int))
 
 
 def test_first_are_the_first_five_and_probabilities_those_of_one_trial(point: tuple) -> None:
