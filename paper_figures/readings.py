@@ -81,7 +81,7 @@ def draw(
             axes.set_xlabel("pairs kept [%]")
         _draw_readings(grid[-1], rows, rows["expected"])
         grid[-1].set_title("both: what 9 demonstrations hold")
-        grid[-1].set_xlabel("expected entries of the truth")
+        grid[-1].set_xlabel("expected entries [demonstrations]")
         for axes in grid:
             axes.axhline(50, color=GUIDE, linewidth=0.8, linestyle=":", zorder=0)
         grid[0].set_ylim(-4, 104)

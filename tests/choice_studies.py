@@ -184,10 +184,87 @@ def success_tables() -> dict[str, pd.DataFrame]:
     }
 
 
+def _shared(rows: list[dict], names: tuple[str, ...]) -> list[dict]:
+    """The rows after 9 and 20 demonstrations, with made-up shares and median rank."""
+    rng, curve = np.random.default_rng(3), []
+    for row in rows:
+        for count in (9, 20):
+            low, median, high = np.sort(rng.uniform(1, 50, 3))
+            values = {"median": median, "median_low": low, "median_high": high}
+            for name in names:
+                low, middle, high = np.sort(rng.random(3))
+                values |= {name: middle, f"{name}_low": low, f"{name}_high": high}
+            curve.append({**row, "demonstrations": count, **values})
+    return curve
+
+
+def _measured(rows: list[dict], measure: str) -> pd.DataFrame:
+    """One measure for each row, with its interval."""
+    limits = {"measure": measure, "mean": 0.2, "low": 0.1, "high": 0.3}
+    return pd.DataFrame([{**row, **limits} for row in rows])
+
+
+def reading_tables() -> dict[str, pd.DataFrame]:
+    """Two truths under four readings of the paper, of two speeds."""
+    names = ["2 rad/s: free", "2 rad/s: clipped", "6 rad/s: free, no winding", "6 rad/s: clipped"]
+    rows = [{"reading": name, "truth": truth} for truth in ("c1", "c2") for name in names]
+    parts = [row["reading"].split(": ") for row in rows]
+    return {
+        "cases": pd.DataFrame(rows).assign(
+            case=[row["reading"] for row in rows],
+            choice=[part[0] for part in parts],
+            value=[part[1] for part in parts],
+        ),
+        "summary": pd.DataFrame(
+            [
+                {**row, "seed": seed, "pairs": 40, "kept": 20 + 2 * place, "demonstrations": 20}
+                for place, row in enumerate(rows)
+                for seed in (0, 1)
+            ]
+        ),
+        "measures": _measured(rows, "truth_probability"),
+        "rank_curve": pd.DataFrame(_shared(rows, ("share_top_5",))),
+    }
+
+
+def rule_breaking_tables() -> dict[str, pd.DataFrame]:
+    """Two truths and rates, without and with an estimate."""
+    rows = [
+        {"demonstrations.rule_breaking": rate, "inference.rule_breaking": way, "truth": truth}
+        for truth in ("c1", "c2")
+        for rate in (0.0, 0.1)
+        for way in ("0.0", "estimate")
+    ]
+    values = ["estimated" if row["inference.rule_breaking"] == "estimate" else "0" for row in rows]
+    cases = [f"eps: {value}" for value in values]
+    return {
+        "cases": pd.DataFrame(rows).assign(case=cases, choice="eps", value=values),
+        "rank_curve": pd.DataFrame(_shared(rows, ("share_top_5",))),
+    }
+
+
+def wrong_model_tables() -> dict[str, pd.DataFrame]:
+    """Two truths, with the nominal model and with another length."""
+    rows = [
+        {"reality.system.length": length, "truth": truth}
+        for length in ("", "1.2")
+        for truth in ("c1", "c2")
+    ]
+    cases = ["length: +20 %" if row["reality.system.length"] else "default" for row in rows]
+    return {
+        "cases": pd.DataFrame(rows).assign(case=cases, choice="length", value=""),
+        "measures": _measured(rows, "rare"),
+        "rank_curve": pd.DataFrame(_shared(rows, ("share_top_5", "claim", "top_1_inside"))),
+    }
+
+
 def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
     """The tables that each figure of a choice is drawn from, by its module."""
     return {
         "choice_effects": choice_effect_tables(),
+        "readings": reading_tables(),
+        "rule_breaking": rule_breaking_tables(),
+        "wrong_model": wrong_model_tables(),
         "start_points": start_point_tables(),
         "calibration_diagram": belief_tables(),
         "forecast_diagram": forecast_tables(),
