@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.rows import Unsuited
-from paper_figures.style import COLUMN, GUIDE, STEP_COLOURS, STEP_MARKS, new_figure
+from paper_figures.style import COLUMN, GUIDE, RC, STEP_COLOURS, STEP_MARKS, new_figure
 
 TABLES = {
     "forecasts": (
@@ -46,7 +47,8 @@ def draw(forecasts: pd.DataFrame) -> Figure:
     axes.set_ylim(0, 104)
     axes.set_xlabel("forecast of crossing [%]")
     axes.set_ylabel("regions that are crossed [%]")
-    figure.legend(loc="outside lower center", ncols=len(KINDS))
+    with plt.rc_context(RC):
+        axes.legend(loc="upper left")
     return figure
 
 
