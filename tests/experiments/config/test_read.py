@@ -83,11 +83,14 @@ def test_spelling_does_not_change_identity() -> None:
     assert len(set(same)) == 1
 
 
-def changed(value: Any) -> Iterator[Any]:
+IN_PLACE_OF_NONE = {"system": {"length": 1.5}, "iterations": 7, "integrator": "rk4"}
+
+
+def changed(value: Any, name: str = "") -> Iterator[Any]:
     """Copies of settings, each with one value changed; another value where it is none."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         for field in dataclasses.fields(value):
-            for other in changed(getattr(value, field.name)):
+            for other in changed(getattr(value, field.name), field.name):
                 yield dataclasses.replace(value, **{field.name: other})
     elif isinstance(value, Mapping):
         yield {**value, "another": 1.0}
@@ -98,7 +101,7 @@ def changed(value: Any) -> Iterator[Any]:
     elif isinstance(value, tuple):
         yield value[:-1] if len(value) > 1 else value * 2
     elif value is None:
-        yield (0.25,)
+        yield IN_PLACE_OF_NONE.get(name, (0.25,))
     else:
         yield value + (0.125 if isinstance(value, float) else 1)
 
