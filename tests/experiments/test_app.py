@@ -15,14 +15,14 @@ from experiments.config.paths import CHECKOUT
 # A command, and a word in the name of the first module that takes time.
 COMMANDS = {
     "run": (["experiments/run.py", "-m", "truth=c1,c2"], "hydra"),
-    "infer": (["experiments/infer.py", "demonstrations=none"], "hydra"),
+    "infer": (["experiments/infer.py", "demonstrations=none"], "numpy"),
     "results": (["experiments/results.py", "status"], "argparse"),
     "figures": (["-m", "paper_figures"], "argparse"),
     "report": (["-m", "paper_figures.report"], "argparse"),
 }
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.03, 0.1, 0.2])
+@pytest.mark.parametrize("delay", [0.0, 0.1])
 @pytest.mark.parametrize("name", COMMANDS)
 def test_ctrl_c_while_modules_are_imported_ends_a_command_quietly(
     name: str, delay: float, tmp_path: Path

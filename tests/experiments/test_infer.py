@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ import pytest
 from commands import run_here
 
 from experiments import infer as command
-from experiments.config.paths import CHECKOUT
 from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
@@ -24,7 +22,6 @@ from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.spaces import Box
 from mlci.systems import Pendulum
 
-SCRIPT = CHECKOUT / "experiments" / "infer.py"
 TRUTH = Regions(Pendulum().space, [[np.pi, 0.0]], [[1.2 * np.pi, 1.2]])
 
 
@@ -75,12 +72,7 @@ def recorded(tmp_path: Path, shown: list[Demonstration]) -> Path:
 def test_recorded_demonstrations_are_ranked_and_saved(
     recorded: Path, shown: list[Demonstration]
 ) -> None:
-    """By the script, as a user would start it from another folder."""
-    words = ["demonstrations=recorded", "grid=100", "dt=0.5", "top=3"]
-    done = subprocess.run(
-        [sys.executable, str(SCRIPT), *words],
-        cwd=recorded, capture_output=True, text=True, timeout=120,
-    )  # fmt: skip
+    done = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.5", "top=3")
     assert done.returncode == 0, done.stderr
     folder = saved(recorded)
     hypotheses = pd.read_csv(folder / "hypotheses.csv")

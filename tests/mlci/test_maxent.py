@@ -107,7 +107,7 @@ def test_blocks_of_any_size_give_the_same_bits(
     grid, actions = Grid(system.space, (11, 12)), action_grid(system, 5)
     regions = Regions.from_grid(system.space, (5, 7))
     mdp = discretize(system, grid, actions, 0.5, regions, samples)
-    whole = TrajectoryDistribution(mdp, 40, [90, 91], 10)
+    whole = TrajectoryDistribution(mdp, 12, [90, 91], 10)
     phi = whole.violation_probabilities()
     assert np.sum((phi > 0.01) & (phi < 0.99)) > 10
     monkeypatch.setattr("mlci.recursions._CELLS_AT_ONCE", cells_at_once)

@@ -17,7 +17,8 @@ export PYTHONPATH=$PWD
 from importlib.metadata import version
 print('hydra14.sh: hydra-core', version('hydra-core'), 'and omegaconf', version('omegaconf'))"
 "$work/venv/bin/python" -W error -m pytest -p no:cacheprovider \
-    tests/test_config.py tests/test_conf_options.py tests/test_sweep.py tests/test_infer.py \
-    tests/test_tables.py tests/test_stages.py tests/test_results.py
+    tests/experiments/config tests/experiments/sweep tests/experiments/test_infer.py \
+    tests/experiments/test_results.py tests/experiments/collate/test_join.py \
+    tests/experiments/point/test_stages.py
 "$work/venv/bin/python" -W error experiments/run.py -m experiment=paper scale=smoke \
     results="$work/results" | tail -n 1

@@ -43,7 +43,7 @@ def launch(task: Any, ends: list[str], *, workers: int, fail_fast: bool) -> list
 
 def test_each_job_returns_its_own_end(task: Any, capsys: pytest.CaptureFixture[str]) -> None:
     ends = ["raise", "kill", "well"]
-    returns = launch(task, ends, workers=2, fail_fast=False)
+    returns = launch(task, ends, workers=1, fail_fast=False)
     assert [each.overrides for each in returns] == [[f"end={end}"] for end in ends]
     assert [each.status for each in returns] == [
         *(JobStatus.FAILED, JobStatus.FAILED, JobStatus.COMPLETED)

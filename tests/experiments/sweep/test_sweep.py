@@ -8,10 +8,18 @@ import os
 import re
 import signal
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
+from unittest import mock
 
 import pytest
 from sweeps import faulty, gone, run, run_here, running, start, tables
+
+from experiments.app import REFUSED
+from experiments.config.read import ConfigError
+from experiments.console import job_names
+from experiments.sweep.planner import Planner
 
 
 def test_tables_do_not_depend_on_workers_order_or_repetition(tmp_path: Path) -> None:
@@ -55,52 +63,55 @@ def records(folder: Path) -> list[dict]:
     return [json.loads(path.read_bytes()) for path in paths]
 
 
-def test_failed_points_fail_alone_and_are_run_again_when_asked(tmp_path: Path) -> None:
-    sweep = ["-m", *faulty(tmp_path), "+system.fault=raise,none,crash,hang,full,warn"]
-    sweep += ["study=s", "sweep.time_limit=6"]
-    status, out, err = run(tmp_path, *sweep)
+def test_failed_points_fail_alone_and_are_run_again_when_asked(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    sweep = ["-m", *faulty(tmp_path), "+system.fault=raise,none,crash,full,warn", "study=s"]
+    status, out, err = run_here(tmp_path, *sweep)
     assert status == 1
-    assert "6 points: 6 missing; 6 to run" in out
-    assert "4 of 6 points failed" in err
+    assert "5 points: 5 missing; 5 to run" in out
+    assert "3 of 5 points failed" in err
     table = failure_table(err)
     name = "+system.fault="
     assert [row[:2] for row in table] == [
         ["raised", f"{name}raise"],
         ["died", f"{name}crash"],
-        ["timeout", f"{name}hang"],
         ["raised", f"{name}full"],
     ]
     assert table[0][2] == "ArithmeticError: the mass fell off its line"
     assert table[1][2] == "ChildProcessError: the worker process was killed by SIGABRT"
-    assert table[2][2] == "still running at its time limit"
-    assert table[3][2] == "OSError: [Errno 27] File too large"
+    assert table[2][2] == "OSError: [Errno 27] File too large"
     # Where each of them was, whether it could still say so itself or not.
-    for where in [
-        'raise ArithmeticError("the mass',
-        "Fatal Python error: Abort",
-        "Timeout (0:00:06)",
-    ]:
+    for where in ('raise ArithmeticError("the mass', "Fatal Python error: Abort"):
         assert where in err
-    assert len(re.findall(r"in dynamics", err)) == 3
+    assert len(re.findall(r"in dynamics", err)) == 2
     assert not list((tmp_path / "results").rglob("*.part"))
     assert not list((tmp_path / "results" / "s").rglob("*.csv"))
     logs = [path.read_text() for path in (tmp_path / "results" / "points").glob("*/log.txt")]
     assert sum("from another program" in log and "the mass wobbles" in log for log in logs) == 1
-    assert "wobbles" not in out + err
+    assert "wobbles" not in "".join([out, err, *capfd.readouterr()])
 
     status, out, err = run_here(tmp_path, *sweep, "sweep.only=[missing,stale]")
     assert status == 0
-    assert "6 points: 2 done, 4 failed; 0 to run" in out
-    assert "4 of 6 points are left, and no table is written" in out
+    assert "5 points: 2 done, 3 failed; 0 to run" in out
+    assert "3 of 5 points are left, and no table is written" in out
     (tmp_path / "healed").touch()
-    status, out, err = run_here(tmp_path, *sweep, "sweep.only=[failed]", "sweep.limit=1")
-    assert status == 0
-    assert "6 points: 2 done, 4 failed; 1 to run" in out
     status, out, err = run_here(tmp_path, *sweep)
     assert status == 0, err
-    assert "6 points: 3 done, 3 failed; 3 to run" in out
-    assert sorted(record["attempt"] for record in records(tmp_path)) == [1, 1, 2, 2, 2, 2]
+    assert "5 points: 2 done, 3 failed; 3 to run" in out
+    assert sorted(record["attempt"] for record in records(tmp_path)) == [1, 1, 2, 2, 2]
     assert not list((tmp_path / "results").rglob("failure.json"))
+
+
+def test_point_that_hangs_is_ended_at_its_time_limit(tmp_path: Path) -> None:
+    words = ["-m", *faulty(tmp_path), "+system.fault=hang", "sweep.time_limit=6"]
+    status, _, err = run_here(tmp_path, *words)
+    assert status == 1
+    (row,) = failure_table(err)
+    assert row[0] == "timeout"
+    assert row[2].endswith("  still running at its time limit")
+    assert "Timeout (0:00:06)" in err
+    assert len(re.findall(r"in dynamics", err)) == 1
 
 
 def test_first_failure_stops_a_sweep_that_fails_fast(tmp_path: Path) -> None:
@@ -109,11 +120,11 @@ def test_first_failure_stops_a_sweep_that_fails_fast(tmp_path: Path) -> None:
     assert status == 1
     assert "1 of 6 points failed" in err
     assert err.splitlines()[-1] == "5 points were not started"
-    status, out, err = run_here(tmp_path, *sweep, "sweep.retries=1", "sweep.limit=1")
+    status, out, err = run_here(tmp_path, *sweep, "sweep.limit=1")
     assert status == 1
     assert "6 points: 1 failed, 5 missing; 1 to run" in out
     failure = next((tmp_path / "results" / "points").glob("*/failure.json"))
-    assert json.loads(failure.read_bytes())["attempt"] == 3
+    assert json.loads(failure.read_bytes())["attempt"] == 2
 
 
 def test_dry_run_shows_states_and_writes_nothing(tmp_path: Path) -> None:
@@ -127,10 +138,16 @@ def test_dry_run_shows_states_and_writes_nothing(tmp_path: Path) -> None:
 
 
 def listed(folder: Path, *arguments: str) -> list[str]:
-    """The names of the points that a sweep would run."""
-    status, out, err = run_here(folder, "-m", "sweep.dry_run=true", *arguments)
-    assert status == 0, err
-    return [line.partition("  ")[2] for line in out.splitlines() if line.startswith("run ")]
+    """The names of the points of a sweep, none of which is composed."""
+    names: list[str] = []
+
+    def plan(_: Planner, jobs: Sequence[Sequence[str]]) -> NoReturn:
+        names.extend(job_names(jobs))
+        raise ConfigError("named")
+
+    with mock.patch.object(Planner, "_plan", plan):
+        assert run_here(folder, "-m", *arguments) == (REFUSED, "", "named\n")
+    return names
 
 
 def test_each_of_the_settings_joins_each_combination(tmp_path: Path) -> None:
@@ -198,12 +215,12 @@ def test_resumes_after_its_processes_were_killed(tmp_path: Path) -> None:
     assert sorted(record["attempt"] for record in records(tmp_path)) == [1, 2]
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("stop", "workers"), [(signal.SIGINT, 2), (signal.SIGTERM, 1)])
 def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(
-    stop: signal.Signals, tmp_path: Path
+    stop: signal.Signals, workers: int, tmp_path: Path
 ) -> None:
     wrong = faulty(tmp_path)
-    process = start(tmp_path, "-m", *wrong, "+system.fault=none,hang", "workers=2")
+    process = start(tmp_path, "-m", *wrong, "+system.fault=none,hang", f"workers={workers}")
     assert running(process.pid)
     points = tmp_path / "results" / "points"
     while not list(points.glob("*/record.json")) and process.poll() is None:
