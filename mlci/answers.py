@@ -12,7 +12,7 @@ from mlci.demonstrations import Demonstration
 from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
-from mlci.misfit import Misfit, misfit
+from mlci.misfit import SAMPLES, Misfit, misfit
 from mlci.regions import Regions
 from mlci.spaces import Bools, Ints
 from mlci.support import Support, support
@@ -141,6 +141,7 @@ def answer(
     hypotheses: Bools | None = None,
     round_horizon: bool = False,
     exact_ends: bool = True,
+    samples: int = SAMPLES,
 ) -> Answer:
     """Look at an inference from all sides.
 
@@ -151,6 +152,7 @@ def answer(
         hypotheses: (C',) mask over the model's regions; None takes all.
         round_horizon: as of `infer`.
         exact_ends: as of `infer`.
+        samples: as of `misfit`.
     """
     distributions = (
         TrajectoryDistribution.of_task(
@@ -161,7 +163,13 @@ def answer(
     return Answer(
         inference=inference,
         support=support(inference),
-        misfit=misfit(distributions, inference.phi, inference.violated, hypotheses=hypotheses),
+        misfit=misfit(
+            distributions,
+            inference.phi,
+            inference.violated,
+            hypotheses=hypotheses,
+            samples=samples,
+        ),
         unseen=unseen(inference),
         cut=cut_by(model.grid, inference.hypotheses),
         temperature=model.temperature,

@@ -61,12 +61,12 @@ def misfit(
         violated: (N, C) D, which regions each demonstration violates.
         hypotheses: (C',) mask of the C regions among the model's; None where these are all.
         samples: trajectories drawn for each task. p = (1 + number at least as extreme) / (1 +
-            samples), which is never 0.
+            samples), which is never 0; with none, p is NaN.
     """
     count, distance = np.sum(violated, axis=1), np.sum(np.abs(phi - violated), axis=1)
     count_p, distance_p = np.full((2, len(violated)), np.nan)
     for j, distribution in enumerate(distributions):
-        if not distribution.is_possible:
+        if samples == 0 or not distribution.is_possible:
             continue
         crossed = sample_crossings(distribution, samples, np.random.default_rng(0))
         drawn = crossed if hypotheses is None else crossed[:, hypotheses]

@@ -13,7 +13,6 @@ from experiments.point.streams import Purpose, stream
 from mlci.demonstrations import Demonstration
 from mlci.maxent import TrajectoryDistribution
 from mlci.metrics import final_state_error, violation_distance
-from mlci.misfit import misfit
 from mlci.simulate import rollout
 from mlci.spaces import Bools, Floats, Ints
 from mlci.systems import System
@@ -75,27 +74,6 @@ def measure_point(settings: Settings, point: PointInference) -> Measures:
         distance[feasible], floor[feasible] = violations.each, violations.floor
         share[feasible] = violations.shares
     return Measures(feasible, phi, error, distance, floor, share, trajectories)
-
-
-def rare_demonstrations(settings: Settings, point: PointInference) -> Floats:
-    """(N,) 1 for a demonstration that the tabular model finds nearly impossible, else 0.
-
-    About one in 50 of its own trajectories is. NaN where the model cannot do the task.
-    """
-    inference = point.inference
-    compared = misfit(
-        [
-            TrajectoryDistribution.of_task(
-                point.model, each.task, exact_ends=settings.inference.exact_ends
-            )
-            for each in point.demonstrations
-        ],
-        inference.phi,
-        inference.violated,
-        hypotheses=point.hypotheses,
-        samples=settings.misfit,
-    )
-    return np.where(inference.reachable, compared.is_rare, np.nan)
 
 
 def rollout_errors(

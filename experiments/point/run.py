@@ -37,6 +37,7 @@ def run_point(
         inference,
         hypotheses=inferred.hypotheses,
         exact_ends=settings.inference.exact_ends,
+        samples=settings.misfit,
     )
     covered = np.flatnonzero(inference.hypotheses.inside(settings.constraint)).tolist()
     for line in answer_lines(result, top, covered):
@@ -51,7 +52,7 @@ def run_point(
     ):
         log(line)
     measures = measure_point(settings, inferred)
-    tables = point_tables(settings, inferred, measures)
+    tables = point_tables(settings, inferred, measures, result.misfit)
     for line in measure_lines(tables["summary"].iloc[0], tables["ranks"], top):
         log(line)
     return tables

@@ -10,7 +10,7 @@ from experiments.point.belief_counts import belief_counts
 from experiments.point.evidence_kinds import evidence_table
 from experiments.point.forecasts import forecast_table
 from experiments.point.inference import PointInference
-from experiments.point.measures import Measures, rare_demonstrations
+from experiments.point.measures import Measures
 from experiments.point.ranking_tables import rank_table, ranking_table
 from experiments.point.streams import Purpose, stream
 from experiments.point.trajectory_tables import (
@@ -21,6 +21,7 @@ from experiments.point.trajectory_tables import (
 from experiments.point.truth_tables import TRUTH_TABLES, truth_tables
 from experiments.tracking.files import csv_bytes
 from mlci.inference import Inference
+from mlci.misfit import Misfit
 from mlci.spaces import Floats
 
 PAPER_SIZE = 9  # demonstrations after which the paper looks at the rank
@@ -28,9 +29,15 @@ FIRST = 5  # demonstrations of the paper's Fig. 7
 
 
 def point_tables(
-    settings: Settings, point: PointInference, measures: Measures
+    settings: Settings, point: PointInference, measures: Measures, compared: Misfit
 ) -> dict[str, pd.DataFrame]:
     """The tables of a point, by name.
+
+    Args:
+        settings: the point.
+        point: what the demonstrations say.
+        measures: what the tabular agent does under the truth.
+        compared: how the demonstrations compare with its own trajectories.
 
     Returns:
         `trials`, a row a demonstration; `ranks`, a row a subset of demonstrations; `hypotheses`, a
@@ -64,7 +71,8 @@ def point_tables(
         "summary": _summary_table(settings, point, measures, ranks),
     }
     if settings.misfit:
-        tables["trials"]["rare"] = rare_demonstrations(settings, point)
+        # About one in 50 of the model's own trajectories is.
+        tables["trials"]["rare"] = np.where(inference.reachable, compared.is_rare, np.nan)
     if settings.calibration.sets:
         tables["calibration"] = belief_counts(settings, point)
         if point.calibration is not None and settings.inference.exact_ends:
