@@ -38,6 +38,7 @@ from mlci.maxent import ROUNDED_TIMES
 from mlci.recordings.read import Problem, read_demonstrations
 from mlci.simulate import step_count
 from mlci.tabular import TabularModel, discretize
+from mlci.temperature import estimate_temperature
 from paper_figures import hypothesis_map
 from paper_figures.style import save
 
@@ -66,24 +67,31 @@ def infer(settings: RecordedSettings) -> int:
         store = Store(results_folder(settings) / "store")
         calibration = recorded_calibration(settings, model, demonstrations, store)
     forecast_map = None if calibration is None else calibration.map
+    exact_ends, rounded = settings.inference.exact_ends, settings.round_horizon
     inference = mlci.preparation.infer(
         model,
         demonstrations,
         prior_none=settings.inference.prior,
         rates=settings.inference.rates(calibrated=forecast_map is not None),
         calibration=forecast_map,
-        exact_ends=settings.inference.exact_ends,
-        round_horizon=settings.round_horizon,
+        exact_ends=exact_ends,
+        round_horizon=rounded,
     )
     if settings.inference.rule_breaking == ESTIMATE:
         inference = inference.with_rule_breaking()
+    temperature = None
+    if settings.estimate_temperature:
+        temperature = estimate_temperature(
+            model, demonstrations, inference, round_horizon=rounded, exact_ends=exact_ends
+        )
     ranking = ranking_table(inference)
     result = answer(
         model,
         demonstrations,
         inference,
-        round_horizon=settings.round_horizon,
-        exact_ends=settings.inference.exact_ends,
+        round_horizon=rounded,
+        exact_ends=exact_ends,
+        temperature=temperature,
     )
     for line in answer_lines(result, settings.top):
         print(line)

@@ -17,6 +17,7 @@ from mlci.regions import Regions
 from mlci.spaces import Bools, Ints
 from mlci.support import Support, support
 from mlci.tabular import TabularModel
+from mlci.temperature import TemperatureEstimate
 
 # Demonstrations without a constraint would enter such a region in less than one set of this size
 # in 20, so that avoiding it says nothing.
@@ -36,6 +37,7 @@ class Answer:
         cut: (C, n) whether a hypothesis has a side in a dimension that is no border of cells.
         temperature: of the tabular model.
         exact_ends: whether its trajectories begin and end at states, not at cells.
+        temperature_estimate: the temperature that the demonstrations look like, if it is known.
     """
 
     inference: Inference
@@ -45,12 +47,14 @@ class Answer:
     cut: Bools
     temperature: float
     exact_ends: bool
+    temperature_estimate: TemperatureEstimate | None = None
 
     @property
     def assumptions(self) -> list[str]:
         """What the answer takes for granted, a phrase each."""
         inference = self.inference
         breaking = inference.rule_breaking
+        estimate = self.temperature_estimate
         of_rules = f"{inference.rates.rule_breaking:g}" if breaking is None else f"{breaking}"
         return [
             "at most one region is forbidden",
@@ -59,7 +63,9 @@ class Answer:
             if inference.calibration is None
             else "evidence calibrated as if people moved like the simulated demonstrator",
             f"rule breaking {of_rules}",
-            f"temperature {self.temperature:g}",
+            f"temperature {self.temperature:g}"
+            if estimate is None
+            else f"temperature {self.temperature:g} ({estimate.summary()})",
             f"paths begin and end at {'states' if self.exact_ends else 'cells'}",
         ]
 
@@ -103,6 +109,9 @@ class Answer:
                 }
                 for j, name in enumerate(inference.names)
             ],
+            "temperature_estimate": None
+            if self.temperature_estimate is None
+            else self.temperature_estimate.record(),
             "unseen": [names[i] for i in self.unseen],
             "warnings": self.warnings,
         }
@@ -116,6 +125,8 @@ class Answer:
                 f"the tabular model finds {len(rare)} of {len(names)} demonstrations nearly "
                 f"impossible (p < 0.01; by chance 1 in 50): {listed(rare)}"
             )
+        if self.temperature_estimate is not None:
+            phrases += self.temperature_estimate.warnings
         if len(self.unseen):
             phrases.append(
                 f"none of the tasks could have shown {len(self.unseen)} of {len(self.cut)} "
@@ -142,6 +153,7 @@ def answer(
     round_horizon: bool = False,
     exact_ends: bool = True,
     samples: int = SAMPLES,
+    temperature: TemperatureEstimate | None = None,
 ) -> Answer:
     """Look at an inference from all sides.
 
@@ -153,6 +165,7 @@ def answer(
         round_horizon: as of `infer`.
         exact_ends: as of `infer`.
         samples: as of `misfit`.
+        temperature: what `mlci.temperature.estimate_temperature` made of the demonstrations.
     """
     distributions = (
         TrajectoryDistribution.of_task(
@@ -174,6 +187,7 @@ def answer(
         cut=cut_by(model.grid, inference.hypotheses),
         temperature=model.temperature,
         exact_ends=exact_ends,
+        temperature_estimate=temperature,
     )
 
 

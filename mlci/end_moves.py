@@ -8,7 +8,7 @@ cell would seem unavoidable, although the demonstration begins and ends outside 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,10 @@ class EndMoves:
     successor: Ints
     reward: Floats
     crosses: Bools
+
+    def scaled(self, factor: float) -> EndMoves:
+        """The same with rewards times a factor, as at another temperature."""
+        return replace(self, reward=self.reward * factor)
 
 
 def first_moves(model: TabularModel, start: Floats) -> EndMoves:

@@ -8,7 +8,7 @@ be reached from the start in t moves, and so wherever no probability ever is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -108,6 +108,17 @@ class TrajectoryDistribution:
             steps = step_count(task.horizon, model.dt, ROUNDED_TIMES)
         ends = Ends(task.start, task.goal) if exact_ends else None
         return cls(model, start, model.grid.cells_in(task.goal), steps, ends)
+
+    def with_temperature_of(self, model: TabularModel) -> TrajectoryDistribution:
+        """The same task on the model at another temperature: `TabularModel.with_temperature`."""
+        other = replace(self, model=model)
+        if self.ends is not None:  # what takes the time has been done
+            scale = self.model.temperature / model.temperature
+            vars(other)["_first_moves"] = self._first_moves.scaled(scale)
+            if self.steps > 1:
+                vars(other)["_cells_between"] = self._cells_between
+                vars(other)["_last_moves"] = self._last_moves.scaled(scale)
+        return other
 
     @cached_property
     def log_z(self) -> Floats:

@@ -5,10 +5,9 @@ anything to ignore (`mlci.evidence`). With the prior pi of `mlci.evidence.poster
 
     M(eps) = pi_0 + sum_i pi_i e^(L_i(eps))
 
-times as likely. The estimate of eps is where M is largest. Its interval reaches from the smallest
-to the largest eps with 2 log(max M / M(eps)) <= q, where q is the quantile of chi^2 with one degree
-of freedom: that of the likelihood ratio test. The rate eta of model error cannot be estimated so,
-since the likelihood of every constraint is largest at eta = 0.
+times as likely. The estimate of eps is where M is largest, with its interval
+(`mlci.likelihood_interval`). The rate eta of model error cannot be estimated so, since the
+likelihood of every constraint is largest at eta = 0.
 """
 
 from __future__ import annotations
@@ -17,14 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, minimize_scalar
 from scipy.special import logsumexp
-from scipy.stats import chi2
 
 from mlci.evidence import Rates, log_evidence, prior_shares, total_gain
+from mlci.likelihood_interval import likelihood_interval
 from mlci.spaces import Floats, Ints
 
-CONFIDENCE = 0.95
 _MOST = 1 - 1e-6  # a rate is below 1
 # M may have several peaks, one for each likely hypothesis; those that are wider than a fiftieth are
 # told apart.
@@ -78,27 +75,8 @@ def estimate_rule_breaking(
         gain = total_gain(log_evidence(alpha, violated, rates))
         return float(logsumexp(np.append(gain, 0.0) + log_prior))
 
-    values = np.array([log_marginal(eps) for eps in _GRID])
-    best = int(np.argmax(values))
-    rate, highest = float(_GRID[best]), float(values[best])
-    near = _GRID[max(best - 1, 0)], _GRID[min(best + 1, len(_GRID) - 1)]
-    peak = minimize_scalar(lambda eps: -log_marginal(eps), bounds=near, method="bounded")
-    if -peak.fun > highest:
-        rate, highest = float(peak.x), float(-peak.fun)
-    level = highest - chi2.ppf(CONFIDENCE, 1) / 2
-
-    def crossing(outside: int, inside: float) -> float:
-        """Where M passes the level between a rate of the grid and one that is above it."""
-        return float(brentq(lambda eps: log_marginal(eps) - level, _GRID[outside], inside))
-
-    above = np.flatnonzero(values >= level)
-    first, last = (int(above[0]), int(above[-1])) if len(above) else (best, best)
-    low, high = min(rate, float(_GRID[first])), max(rate, float(_GRID[last]))
-    return RateEstimate(
-        rate,
-        crossing(int(np.searchsorted(_GRID, low)) - 1, low) if low > 0 else 0.0,
-        crossing(int(np.searchsorted(_GRID, high, "right")), high) if high < _MOST else 1.0,
-    )
+    rate, lower, upper = likelihood_interval(log_marginal, _GRID)
+    return RateEstimate(rate, lower, 1.0 if upper == _MOST else upper)
 
 
 def gains_of_subsets(

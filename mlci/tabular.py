@@ -144,6 +144,17 @@ class TabularModel:
         rows = self.crosses[cells[:-1] * self.moves + moves]
         return np.asarray(rows.sum(axis=0)).ravel() > 0
 
+    def with_temperature(self, temperature: float) -> TabularModel:
+        """The model at another temperature: moves are the same, rewards scale.
+
+        Raises:
+            ValueError: a temperature that is not positive.
+        """
+        if not temperature > 0:
+            raise ValueError(f"a temperature must be positive, not {temperature}")
+        reward = self.reward * (self.temperature / temperature)
+        return replace(self, reward=reward, temperature=temperature)
+
     def under(self, truth: ArrayLike) -> TabularModel:
         """The model under constraints, equation (3): moves that cross the truth are not allowed.
 

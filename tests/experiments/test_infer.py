@@ -112,6 +112,16 @@ def test_a_bad_file_is_named_and_the_others_are_not_lost(recorded: Path) -> None
     assert len(record["not_used"]) == 1
 
 
+def test_the_temperature_is_told_on_demand(recorded: Path) -> None:
+    coarse = ("demonstrations=recorded", "grid=100", "dt=0.5", "inference.calibrate=false")
+    done = infer(recorded, *coarse, "estimate_temperature=true")
+    assert done.returncode == 0, done.stderr
+    assert "(the paths look" in " ".join(done.stdout.split())
+    answer = json.loads((saved(recorded) / "answer.json").read_text())
+    estimate = answer["temperature_estimate"]
+    assert estimate["lower"] <= estimate["temperature"] <= estimate["upper"]
+
+
 def test_durations_that_dt_does_not_divide(recorded: Path) -> None:
     refused = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.3")
     assert refused.returncode == 2

@@ -18,6 +18,7 @@ from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator
 from mlci.tabular import action_grid, discretize
+from mlci.temperature import TemperatureEstimate
 
 SYSTEM = DoubleIntegrator()
 HYPOTHESES = Regions.from_grid(SYSTEM.space, (6, 6))
@@ -45,6 +46,15 @@ def to_and_fro() -> list[Demonstration]:
 def result() -> Answer:
     demonstrations = to_and_fro()
     return answer(MODEL, demonstrations, infer(MODEL, demonstrations))
+
+
+def test_the_temperature_that_paths_look_like_is_told(result: Answer) -> None:
+    estimate = TemperatureEstimate(1.0, 0.4, 0.2, 0.9, (0.01, 100.0), ("there", "back"))
+    more = replace(result, temperature_estimate=estimate)
+    assert "temperature 1 (the paths look like 0.4 (0.2 to 0.9))" in more.assumptions
+    assert estimate.warnings[0] in more.warnings
+    assert json.loads(json.dumps(more.record()))["temperature_estimate"]["lower"] == 0.2
+    assert result.record()["temperature_estimate"] is None
 
 
 def test_the_parts_are_of_the_inference(result: Answer) -> None:

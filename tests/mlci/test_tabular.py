@@ -175,6 +175,29 @@ def test_temperature_divides_the_reward() -> None:
     np.testing.assert_allclose(cold.reward, 2 * discretize(*arguments).reward)
 
 
+@pytest.mark.parametrize("samples", [1, 2])
+def test_another_temperature_is_as_good_as_a_fresh_model(samples: int) -> None:
+    """Also what is merged, and under a truth."""
+    system = DoubleIntegrator()
+    regions = Regions.from_grid(system.space, (2, 2))
+    arguments = system, Grid(system.space, (6, 5)), action_grid(system, 3), 0.5, regions, samples
+    fresh = discretize(*arguments, temperature=0.3).under([True, False, False, False])
+    model = discretize(*arguments, temperature=2.0)
+    assert model.merged.log_weight.size > 0  # held before the temperature changes
+    changed = model.under([True, False, False, False]).with_temperature(0.3)
+    assert changed.temperature == 0.3
+    np.testing.assert_allclose(changed.reward, fresh.reward, rtol=1e-14)
+    np.testing.assert_array_equal(changed.allowed, fresh.allowed)
+    np.testing.assert_array_equal(changed.truth, fresh.truth)
+    start, goal = 17, np.arange(30)
+    both = [TrajectoryDistribution(each, start, goal, 4) for each in (changed, fresh)]
+    assert both[0].is_possible
+    np.testing.assert_allclose(both[0].log_z, both[1].log_z, rtol=1e-13)
+    np.testing.assert_allclose(*(each.avoidance_probabilities() for each in both), rtol=1e-13)
+    with pytest.raises(ValueError, match="a temperature must be positive, not 0"):
+        model.with_temperature(0)
+
+
 def test_action_grid_spans_the_control_box() -> None:
     np.testing.assert_allclose(action_grid(Pendulum(), 5)[:, 0], [-2, -1, 0, 1, 2])
     np.testing.assert_allclose(action_grid(Pendulum(), [1]), [[0.0]])

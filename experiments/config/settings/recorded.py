@@ -48,5 +48,12 @@ class RecordedSettings(ModelSettings):
         Flag,
         about("take the nearest whole number of time steps where dt does not divide a duration"),
     ]
+    estimate_temperature: Annotated[
+        Flag,
+        about(
+            "also tell the temperature that the demonstrations look like; takes about ten times as "
+            "long as the inference"
+        ),
+    ]
     top: Annotated[Count, about("hypotheses that are printed")]
     results: Annotated[Word | None, RESULTS]

@@ -1,0 +1,81 @@
+"""The reward of a recorded path: by inverse dynamics, where its controls are not known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mlci.demonstrations import Demonstration
+from mlci.simulate import RK4
+from mlci.spaces import Floats
+from mlci.systems import System
+
+_ITERATIONS = 10  # one is enough where the control enters linearly
+_GUESSES = 5  # values of each control from which the search may begin
+
+
+def controls_along(system: System, states: Floats, dt: float) -> Floats:
+    """Controls (K, m) that lead from each sample of a path to the next, as nearly as any do.
+
+    Least squares by Gauss-Newton steps, over the difference of a Runge-Kutta step from the next
+    sample in parts of the state space's widths. They may exceed the control box.
+
+    Args:
+        system: the dynamics.
+        states: (K+1, n) path.
+        dt: time between samples [s].
+    """
+    before, after = states[:-1], states[1:]
+    widths, box = system.space.bounds.widths, system.control_box
+
+    def difference(controls: Floats) -> Floats:
+        """(..., K, n) how far the next samples are from what controls (..., K, m) lead to."""
+        return system.space.difference(after, RK4.step(system, before, controls, dt)) / widths
+
+    ticks = np.linspace(box.lower, box.upper, _GUESSES).T
+    guesses = np.stack([part.ravel() for part in np.meshgrid(*ticks)], axis=-1)
+    misses = [
+        np.linalg.norm(difference(np.tile(guess, (len(before), 1))), axis=1) for guess in guesses
+    ]
+    controls, miss = guesses[np.argmin(misses, axis=0)], np.min(misses, axis=0)
+    for _ in range(_ITERATIONS):
+        _, by_control = RK4.rate_jacobians(system, before, controls, dt)
+        inverse = np.linalg.pinv(by_control * dt / widths[:, None])
+        moved = controls + np.einsum("kij,kj->ki", inverse, difference(controls))
+        moved_miss = np.linalg.norm(difference(moved), axis=1)
+        better = moved_miss < miss
+        controls = np.where(better[:, None], moved, controls)
+        miss = np.where(better, moved_miss, miss)
+        if not better.any():
+            break
+    return controls
+
+
+def path_reward(system: System, demonstration: Demonstration, steps: int) -> float:
+    """What a recorded path earns an agent that holds each control for one of T equal steps.
+
+    The recorded controls, or else those of `controls_along`, are averaged over each step: that is
+    the held control with the same effect on a velocity, and it averages away what noise adds from
+    sample to sample. The reward is that of the state in which the step begins, as in the tabular
+    model.
+
+    Args:
+        system: the dynamics and the running reward r.
+        demonstration: the path.
+        steps: T.
+
+    Returns:
+        The reward at temperature 1 [nat].
+    """
+    states, controls = demonstration.states, demonstration.controls
+    if controls is None:
+        controls = controls_along(system, states, demonstration.dt)
+    samples, edges = np.arange(float(len(states))), np.linspace(0, len(controls), steps + 1)
+    sums = np.cumsum(np.vstack([np.zeros(controls.shape[1]), controls]), axis=0)
+    held = np.diff(_between(samples, sums, edges), axis=0) * (steps / len(controls))
+    reward = system.running_reward(_between(samples, states, edges[:-1]), held)
+    return float(np.sum(np.broadcast_to(reward, steps)) * demonstration.task.horizon / steps)
+
+
+def _between(samples: Floats, values: Floats, places: Floats) -> Floats:
+    """(Q, d) values (K+1, d) of samples, interpolated linearly at places (Q,)."""
+    return np.column_stack([np.interp(places, samples, column) for column in values.T])
