@@ -147,12 +147,12 @@ def _left_out_words(answer: Answer) -> str:
     if support.stays.all():
         return f"{name} stays first whichever demonstration is left out"
     others = [
-        f"{inference.hypotheses.names[support.first_without[j]]} without {inference.names[j]}"
+        f"without {inference.names[j]} {inference.hypotheses.names[support.first_without[j]]}"
         for j in np.flatnonzero(~support.stays)
     ]
     return (
         f"{name} stays first when any but {len(others)} of {len(support.stays)} demonstrations is "
-        f"left out; first are {listed(others, _CARRIERS)}"
+        f"left out; first is {listed(others, _CARRIERS)}"
     )
 
 

@@ -25,7 +25,7 @@ TINY = [
     "actions=3",
     "rollouts=1",
     "safety.shape=[11,11]",
-    "demonstrations.pairs=4",
+    "demonstrations.pairs=6",
     "demonstrations.keep=2",
     "demonstrations.dt=0.1",
     "demonstrations.goal_tolerance=5",
@@ -33,6 +33,7 @@ TINY = [
     "demonstrations.restarts=1",
     "ranks.demonstrations=1",
     "ranks.subsets=2",
+    "inference.calibrate=false",
     "truth.boxes=[{lower:[-0.6,null],upper:[0.6,null]}]",
 ]
 # A system that goes wrong in the worker only, once the config was accepted.

@@ -18,6 +18,8 @@ from mlci.inference import Inference
 from mlci.preparation import infer
 
 FIXED_RATES = (0.05, 0.1, 0.2)
+COLUMNS = ["prior", "sets", "set", "demonstrations", "evidence", "best", "right", "of_truth", "top"]
+COLUMNS += ["feasible"]
 
 
 def evidence_table(
@@ -39,7 +41,8 @@ def evidence_table(
     kinds, cell = _kinds(settings, point, calibration), settings.truth.cell
     hypotheses, prior_none = len(point.inference.hypotheses), point.inference.prior_none
     longest = max(settings.calibration.demonstrations)
-    firsts = range(0, len(point.inference.names) - longest + 1, longest)
+    names = point.inference.names
+    firsts = range(0, max(1, len(names) - longest + 1), longest)  # one may be short
     opening = {
         "prior": prior_none if cell is None else (1 - prior_none) / hypotheses,
         "sets": len(firsts),
@@ -47,6 +50,8 @@ def evidence_table(
     rows = []
     for number, first in enumerate(firsts):
         for count in settings.calibration.demonstrations:
+            if count > len(names):
+                continue
             for kind, inference in kinds.items():
                 ranking = inference.of(slice(first, first + count)).ranking
                 best = int(ranking.order[0])
@@ -67,7 +72,7 @@ def evidence_table(
                         "feasible": int(np.sum(ranking.feasible)),
                     }
                 )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def _kinds(

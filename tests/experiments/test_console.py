@@ -87,8 +87,8 @@ def test_what_is_printed_where_there_is_little_to_say() -> None:
     assert "95 % credible no constraint and 11 regions in 1 area:" in text
     text = said(answer(PLANE, (6, 2), [[0.01, 1.0], [1.0, 0.1]]))
     assert (
-        "0 stays first when any but 1 of 2 demonstrations is left out; first are 1 without "
-        "demonstration_of_the_0th_person"
+        "0 stays first when any but 1 of 2 demonstrations is left out; first is without "
+        "demonstration_of_the_0th_person 1"
     ) in text
     apart = np.where(np.isin(np.arange(25), [0, 2, 10, 12, 20]), 1e-4, 1.0).tolist()
     text = said(answer(BODY, (None, 5, 5, None), [apart]))

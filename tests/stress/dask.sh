@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # A sweep through a Dask scheduler and two workers on this machine, one of which is killed, resumed,
-# and compared byte for byte with a run without Dask.
+# and compared byte for byte with a run without Dask; and one through a cluster in its own process.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 PYTHON=$PWD/.venv/bin/python
@@ -65,6 +65,10 @@ case $done_first in 4 | 6) ;; *) echo "dask.sh: $done_first of 8 points done, no
 sweep "$work/results" "${dask[@]}" > "$work/second.log" 2>&1
 grep "points:" "$work/second.log"
 diff -r "$work/local/s/tables" "$work/results/s/tables"
+
+sweep "$work/inside" hydra/launcher=dask hydra.launcher.jobs=2 > "$work/inside.log" 2>&1
+grep "2 Dask jobs" "$work/inside.log"
+diff -r "$work/local/s/tables" "$work/inside/s/tables"
 
 # --- stopped: the workers live on, and what they ran for it does not
 touch "$HOLD"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -78,3 +80,26 @@ def test_each_kind_is_an_inference(kind: str, table: pd.DataFrame, point: PointI
         assert row["top"] == (part.ranking.rank[6] <= 5)
         assert row["feasible"] == part.ranking.feasible.sum()
         assert (row["prior"], row["sets"]) == (0.5 / 10, sets)
+
+
+def test_a_world_with_few_demonstrations_has_one_short_set(
+    settings: Settings, point: PointInference, table: pd.DataFrame
+) -> None:
+    assert point.calibration is not None
+    two, one = (
+        dataclasses.replace(
+            point,
+            demonstrations=point.demonstrations[:count],
+            inference=point.inference.of(slice(count)),
+        )
+        for count in (2, 1)
+    )
+    short = evidence_table(settings, two, point.calibration)
+    first = table[(table["set"] == 0) & (table["demonstrations"] == 2)]
+    pd.testing.assert_frame_equal(
+        short.drop(columns="sets"), first.drop(columns="sets").reset_index(drop=True)
+    )
+    assert set(short["sets"]) == {1}
+    nothing = evidence_table(settings, one, point.calibration)
+    assert nothing.empty
+    assert list(nothing.columns) == list(table.columns)
