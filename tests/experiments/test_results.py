@@ -156,7 +156,7 @@ def test_show_tells_config_record_and_results(settings: Settings, tmp_path: Path
     assert row(out, "  final_state_error") == ["final_state_error", error]
     log = (points[0].folder / "log.txt").read_text().splitlines()
     assert log[0].startswith("answer          ")
-    assert "demonstrations  4 of 6 kept" in "\n".join(log)
+    assert "demonstrations  5 of 6 kept" in "\n".join(log)
     assert out.splitlines()[-len(log) - 1 :] == ["log", *(f"  {line}" for line in log)]
     _, out, _ = look("show", "s")
     assert "s: 2 points: 2 done" in out

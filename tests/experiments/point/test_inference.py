@@ -55,7 +55,9 @@ def test_evidence_is_calibrated_where_it_can_be(
     settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = dataclasses.replace(settings.inference, calibrate=True)
-    settings, store = dataclasses.replace(settings, inference=asked), Store(tmp_path)
+    more = dataclasses.replace(settings.demonstrations, keep=5)  # some of which say something
+    settings = dataclasses.replace(settings, inference=asked, demonstrations=more)
+    store = Store(tmp_path)
     point = infer_point(settings, store)
     assert point.inference.calibration == forecast_calibration(settings, store).map is not None
     assert point.inference.rates.model_error == 0

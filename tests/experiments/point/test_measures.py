@@ -60,7 +60,9 @@ def point() -> PointInference:
         model=model,
         hypotheses=hypotheses,
         truth=regions.mask(["truth_0"]),
-        inference=infer(model, demonstrations(), hypotheses=hypotheses, tolerance=1.0),
+        inference=infer(
+            model, demonstrations(), hypotheses=hypotheses, tolerance=1.0, exact_ends=False
+        ),
         diagnosis=diagnose(model),
     )
 

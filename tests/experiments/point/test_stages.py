@@ -86,7 +86,7 @@ def test_model_is_computed_once_for_all_that_it_does_not_depend_on(
 
 
 def test_nothing_forbidden_needs_no_safe_set_and_ranks_nothing(tmp_path: Path) -> None:
-    settings = composed("truth=none", "scale=smoke", "ranks.subsets=2", "dt=1.0")
+    settings = composed("truth=none", "inference=paper", "scale=smoke", "ranks.subsets=2", "dt=1.0")
     lines: list[str] = []
     tables = run_point(settings, Store(tmp_path), lines.append)
     assert lines[-1].strip() == "nothing is forbidden, so there is no truth to rank"

@@ -106,9 +106,11 @@ def test_recorded_states_are_noisy_and_tasks_read_off_them(tmp_path: Path) -> No
         trials.demonstrations(settings_of(*WORDS, *words), store)
         for words in ([], ["reality.sensor_noise=[0.02,0.05]"])
     )
-    noise = noisy.states - exact.states
-    # 4000 samples: four standard errors of a standard deviation are 4.5 %.
-    np.testing.assert_allclose(np.std(noise, axis=(0, 1)), [0.02, 0.05], rtol=0.045)
+    kept = exact.outcome == "kept"  # what leaves the space is cut off where it is recorded
+    noise = noisy.states[kept] - exact.states[kept]
+    assert len(noise) > 30
+    # Over 3000 samples: four standard errors of a standard deviation are below 5.2 %.
+    np.testing.assert_allclose(np.std(noise, axis=(0, 1)), [0.02, 0.05], rtol=0.052)
     np.testing.assert_array_equal(noisy.outcome, exact.outcome)
     np.testing.assert_array_equal(noisy.starts, noisy.states[:, 0])
     np.testing.assert_array_equal(noisy.goal_upper, noisy.states[:, -1])

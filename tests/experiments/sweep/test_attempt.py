@@ -140,7 +140,7 @@ def test_record_says_what_a_result_comes_from(point: Point, settings: Settings) 
     record = point.record()
     assert record["config"]["grid"] == {"shape": [12, 8], "offset": None}
     assert record["summary"] == summary_row(point)
-    assert record["summary"]["kept"] == 4
+    assert record["summary"]["kept"] == 5
     assert record["summary"]["final_state_error"] > 0
     wanted = {"identity", "source", "seed", "files", "stages", "attempt", "started", "seconds"}
     wanted |= {"git", "host", "system", "cpu", "cores", "blas_threads", "python", "packages"}
