@@ -89,4 +89,4 @@ __all__ = [
     "write_demonstration",
 ]
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
