@@ -42,6 +42,11 @@ from mlci.temperature import estimate_temperature
 from paper_figures import hypothesis_map
 from paper_figures.style import save
 
+ON_WRONG_MODELS = (
+    'results/paper/REPORT.md, "Demonstrators who are not the nominal model", for how often answers '
+    "are right where that is so"
+)
+
 
 def main() -> int:
     """Run the command line.
@@ -95,6 +100,9 @@ def infer(settings: RecordedSettings) -> int:
     )
     for line in answer_lines(result, settings.top):
         print(line)
+    if np.any(result.misfit.is_rare):
+        for line in entry("see", ON_WRONG_MODELS):
+            print(line)
     if calibration is not None:
         for line in entry("calibration", calibration.summary()):
             print(line)

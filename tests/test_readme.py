@@ -53,6 +53,8 @@ SHORT = [
     (r"^(?!.*scale=smoke)(.*run\.py -m .*)", r"\1 scale=smoke sweep.dry_run=true"),
     (r"^(?!.*scale=smoke)(.*run\.py( .*)?)$", r"\1 scale=smoke"),
     (r"^(.*run\.py .*)", r"\1 workers=1"),
+    # Two hundred simulated demonstrators a command are for the tests of calibration.
+    (r"^(?!.*inference)(.*(run|infer)\.py .*)", r"\1 inference.calibrate=false"),
 ]
 # Commands that run here, as starting each of them takes a second or two.
 MAINS = {

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from mlci.evidence import log_evidence, rank_constraints, total_gain
+from mlci.evidence import log_evidence, posterior, rank_constraints, total_gain
 from mlci.metrics import (
     claims,
     final_state_error,
@@ -130,3 +130,8 @@ def test_claim_is_the_posterior_of_the_best() -> None:
     gains = np.log([[8.0, 1.0], [1.0, 2.0]])
     np.testing.assert_allclose(claims(gains, 0.5), [8 / (8 + 1 + 2), 2 / (1 + 2 + 2)])
     np.testing.assert_allclose(claims(np.array([[-np.inf, 0.0], [np.inf, 0.0]]), 0.5), [1 / 3, 1])
+    many = np.random.default_rng(0).normal(0, 3, (50, 7))
+    many[many < -4] = -np.inf
+    many[:5, :2] = np.inf
+    expected = [np.max(posterior(gain, 0.3)[0]) for gain in many]
+    np.testing.assert_allclose(claims(many, 0.3), expected, rtol=1e-13)

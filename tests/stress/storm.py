@@ -154,6 +154,24 @@ def kill(victims: list[int]) -> None:
             continue
 
 
+def terminated(base: Path) -> None:
+    """SIGTERM to the parent alone: it ends its workers, says so, and the same command resumes."""
+    folder, sweep = folder_for(base, "terminated")
+    process = start(folder, *sweep)
+    while not (folder / "finished.txt").exists():
+        assert process.poll() is None
+        time.sleep(0.1)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert "stopped; what has finished is kept" in err, err
+    assert "Traceback" not in err, err
+    assert gone(process.pid), "processes are left"
+    finish(folder, sweep)
+    check_whole(folder, 24, undisturbed(base))
+    print("terminated: stopped, resumed, each point once, tables equal")
+
+
 def two_at_once(base: Path) -> None:
     """Two sweeps over the same points, started together."""
     expected = undisturbed(base)
@@ -233,7 +251,7 @@ def main() -> None:
     """Run all storms, or those that are named."""
     sys.stdout.reconfigure(line_buffering=True)
     base = Path(tempfile.mkdtemp(prefix="storm-"))
-    for storm in (overhead, collating, kill_storm, two_at_once, full_disk):
+    for storm in (overhead, collating, kill_storm, terminated, two_at_once, full_disk):
         if sys.argv[1:] and storm.__name__ not in sys.argv[1:]:
             continue
         storm(base)

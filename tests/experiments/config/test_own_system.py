@@ -32,7 +32,10 @@ MAINS = {
 CACHES = (sources._read_source, sources._module_names, sources._neighbours)
 SMALL = ["grid.shape=[8,8,8]"]
 SMOKE = {
-    "mlci-run": ["scale=smoke", "safety.shape=[21,21,12]", "workers=1", *SMALL],
+    "mlci-run": [
+        *("scale=smoke", "safety.shape=[21,21,12]", "workers=1", "inference.calibrate=false"),
+        *SMALL,
+    ],
     "mlci-infer": SMALL,
     "mlci-advise": [*SMALL, "grids=[[8,8,8]]", "dts=[1.0]", "pairs=4", "remedy=1"],
     "mlci-figures": ["--jobs", "1"],
