@@ -99,10 +99,12 @@ def _alpha_one_step_back(
 ) -> Floats:
     """alpha_t (Q, C') of some cells, from alpha_(t+1) (Q', C'), whose rows `row_of` (S,) gives.
 
-    First the sum over all moves, as a product; then, for the cells and regions that some move
-    crosses, the sum over the others anew.
+    First the sum over all moves, as a product. Then, for the cells and regions that some move
+    crosses: less what those moves bring where that is up to a half, which costs no digit; elsewhere
+    the sum over the others anew.
     """
-    merged, last = model.merged, first + alpha_after.shape[1]
+    merged, width = model.merged, alpha_after.shape[1]
+    last = first + width
     move, ends = _ranges(merged.begins, cells)
     value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
     probability = np.exp(value - np.repeat(log_z[t, cells], np.diff(ends)))
@@ -114,13 +116,23 @@ def _alpha_one_step_back(
     owner, entry, region = _of_cells(
         merged.crossing_begins, merged.crossing_region, cells, first, last
     )
-    if len(owner):
-        pair, which = np.unique(owner * (last - first) + region, return_inverse=True)
-        cell_of, region_of = np.divmod(pair, last - first)
+    place = merged.crossing_move[entry] - merged.begins[cells[owner]]
+    crossing = ends[owner] + place
+    lost = np.bincount(
+        owner * width + region,
+        probability[crossing] * alpha_after[column[crossing], region],
+        minlength=alpha.size,
+    ).reshape(alpha.shape)
+    anew = lost > alpha / 2
+    alpha -= lost
+    again = anew[owner, region]
+    if again.any():
+        owner, region, place = owner[again], region[again], place[again]
+        pair, which = np.unique(owner * width + region, return_inverse=True)
+        cell_of, region_of = np.divmod(pair, width)
         # All moves of the cell of each pair, one pair after the other, without those that cross.
         every, begins = _ranges(ends, cell_of)
         weight = probability[every]
-        place = merged.crossing_move[entry] - merged.begins[cells[owner]]
         weight[begins[which] + place] = 0.0
         weight *= alpha_after[column[every], np.repeat(region_of, np.diff(begins))]
         alpha[cell_of, region_of] = np.add.reduceat(weight, begins[:-1])
