@@ -43,7 +43,7 @@ smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
 test: $(READY) ## run the tests, on all cores
 	$(BIN)/python -m pytest -n logical --dist worksteal
 
-stress: $(READY) ## run what is too long for the tests: kill storms, fuzzing, SLURM, Dask, Hydra 1.4
+stress: $(READY) ## run what is too long for the tests: kill storms, fuzzing, clusters, Hydra 1.4, slow oracles
 	@set -e; for each in $(wildcard tests/stress/*.py) $(wildcard tests/stress/*.sh); do \
 		echo "=== $$each"; start=$$(date +%s); \
 		case $$each in *.py) $(BIN)/python $$each;; *) $$each;; esac; \

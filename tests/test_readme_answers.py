@@ -79,6 +79,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     sys.modules.pop("unicycle", None)
 
 
+@pytest.mark.long
 def test_the_unicycles_pillar_is_first(folder: Path) -> None:
     """A region of the pillar comes first with a finite gain, and nothing is certain."""
     words = ["subject=unicycle", f"results={folder / 'results'}", *SMALLER]

@@ -138,6 +138,7 @@ def survivors(states, seconds=2.4, dt=0.02):
     return np.isin(np.arange(len(states)), owner)
 
 
+@pytest.mark.long
 def test_no_switching_saves_a_state_that_no_constant_control_saves():
     states = np.random.default_rng(0).uniform([-1, -2, 6, -3], [1, 2, 10, 3], (20_000, 4))
     value = escape_value(TELESCOPE, PAIN, states, 5.0, 0.025)

@@ -227,6 +227,7 @@ class Gentle(Pendulum):
 
 
 @pytest.mark.parametrize("system", [Upright(), Gentle()], ids=lambda each: type(each).__name__)
+@pytest.mark.long
 def test_swing_with_a_reward_of_its_own_is_the_one_that_pontryagin_says(system):
     # Minimum of -int r: d(-r)/du = -q, with costates p' = d r/d theta - q cos(theta), q' = -p.
     def motion(_, y):
@@ -323,6 +324,7 @@ def test_reward_of_states_alone_is_optimised():
     [(EULER, 1, (50, 100, 200), 0.02), (RK4, 2, (25, 50, 100), 2e-4)],
     ids=["Euler", "Runge-Kutta"],
 )
+@pytest.mark.long
 def test_effort_comes_closer_with_the_integrators_order(
     swing_effort, integrator, order, steps, bias
 ):

@@ -196,6 +196,7 @@ def near_border(safe_set, count, cells=(2, 4)):
 
 @pytest.mark.parametrize("corners", [BOTTOM, SIDE, WALL])
 @pytest.mark.parametrize("system", [PENDULUM, WEAK_PENDULUM])
+@pytest.mark.long
 def test_brute_force_agrees_on_both_sides_of_the_border(system, corners):
     keep_out = region(system, corners)
     safe_set = solve_safe_set(system, Grid(system.space, (101, 101)), keep_out)
@@ -306,6 +307,7 @@ def cannot_stop(states, left, right):
 
 @pytest.mark.parametrize("count", [51, 101])
 @pytest.mark.parametrize("corners", [WALL, ((1.6 * np.pi, -FREE), (1.8 * np.pi, FREE))])
+@pytest.mark.long
 def test_the_border_round_a_wall_errs_by_at_most_half_a_cell_to_either_side(corners, count):
     grid = Grid(PENDULUM.space, (count, count))
     safe_set = solve_safe_set(PENDULUM, grid, region(PENDULUM, corners))

@@ -40,6 +40,7 @@ def test_the_estimate_is_the_peak_of_the_sum_over_who_breaks_rules(seed: int) ->
     assert estimate.upper == pytest.approx(inside[-1], abs=0.002)
 
 
+@pytest.mark.long
 def test_the_interval_covers_the_rate_in_simulated_worlds() -> None:
     """95 % intervals over 120 worlds: 89 % is three standard errors below."""
     rng, covered, rates, eps = np.random.default_rng(1), [], [], 0.15

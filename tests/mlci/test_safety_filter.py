@@ -66,6 +66,7 @@ def entries(safety, corners, runs, seconds=5.0):
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("corners", [BOTTOM, SIDE])
+@pytest.mark.long
 def test_no_run_of_ten_thousand_enters(corners, width):
     omega = safe_set(corners)
     margin = border_margin(PENDULUM, omega, DT)

@@ -126,6 +126,7 @@ def test_the_likelihood_is_the_sum_over_what_may_be_forbidden(seed: int, rates: 
     assert (found.assumed, found.used) == (1.0, tuple("01234567"))
 
 
+@pytest.mark.long
 def test_the_interval_covers_the_temperature_of_drawn_paths() -> None:
     """In 200 worlds, of which three in four have a constraint: 95 % +- three standard errors."""
     rng, covered, truth = np.random.default_rng(2), [], 0.6

@@ -164,6 +164,7 @@ def test_the_command_draws_what_is_there_and_refuses_what_is_not(
     assert "0 processes draw nothing; -1 is one a core" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_ctrl_c_while_processes_draw_ends_all_of_them_quietly(tmp_path: Path) -> None:
     write_tables(tmp_path / "study", study_tables())
     process = subprocess.Popen(

@@ -49,6 +49,7 @@ def test_the_facts_are_the_tables() -> None:
     assert sum("grows with the power" in line for line in lines) == 1
 
 
+@pytest.mark.long
 def test_the_benchmark_measures_what_the_figure_needs() -> None:
     command = [sys.executable, "-m", "tests.benchmark.scale", "torus", "5", "4", "5", "4"]
     done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, timeout=60)

@@ -13,6 +13,7 @@ from experiments.sweep import dask_jobs, slurm
 DASK = ["hydra/launcher=dask", "hydra.launcher.jobs=1"]
 
 
+@pytest.mark.long
 def test_a_dask_job_runs_its_share_and_tells_how_points_ended(tmp_path: Path) -> None:
     sweep = ["-m", *faulty(tmp_path), "+system.fault=none,exit", "study=s"]
     status, out, err = run(tmp_path, *sweep, *DASK)

@@ -78,6 +78,7 @@ def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return ["hydra/launcher=slurm", "hydra.launcher.jobs=2", "hydra.launcher.poll=0.2"]
 
 
+@pytest.mark.long
 def test_killed_job_fails_alone(cluster: list[str], tmp_path: Path) -> None:
     (tmp_path / "deadly.py").write_text(DEADLY)
     sweep = ["-m", "system._target_=deadly.Deadly", "+system.deadly=false,true", "study=s"]
@@ -90,6 +91,7 @@ def test_killed_job_fails_alone(cluster: list[str], tmp_path: Path) -> None:
     assert not list((tmp_path / "results").rglob("*.pkl"))
 
 
+@pytest.mark.long
 def test_job_that_dies_before_its_points_start_passes_for_nothing_earlier(
     cluster: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -63,6 +63,7 @@ def records(folder: Path) -> list[dict]:
     return [json.loads(path.read_bytes()) for path in paths]
 
 
+@pytest.mark.long
 def test_failed_points_fail_alone_and_are_run_again_when_asked(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -114,6 +115,7 @@ def test_point_that_hangs_is_ended_at_its_time_limit(tmp_path: Path) -> None:
     assert len(re.findall(r"in dynamics", err)) == 1
 
 
+@pytest.mark.long
 def test_first_failure_stops_a_sweep_that_fails_fast(tmp_path: Path) -> None:
     sweep = ["-m", *faulty(tmp_path), "+system.fault=raise,none", "seed=0,1,2"]
     status, out, err = run_here(tmp_path, *sweep, "sweep.fail_fast=true")
