@@ -67,7 +67,12 @@ class FinishedPoint:
         return dict(zip(names, summary[names].iloc[0], strict=True))
 
     def table(self, name: str) -> pd.DataFrame:
-        """A table of strings.
+        """A table of strings; errors as of `content`."""
+        # As objects: pandas' own type for strings is slower to read and to write.
+        return pd.read_csv(io.BytesIO(self.content(name)), dtype=object, keep_default_na=False)
+
+    def content(self, name: str) -> bytes:
+        """A table as the point wrote it.
 
         Raises:
             CollateError: there is none, or it is not as the point wrote it.
@@ -79,8 +84,7 @@ class FinishedPoint:
         data = path.read_bytes()
         if digest(data) != written:
             raise CollateError(f"{path} is not as its point wrote it; run the sweep again")
-        # As objects: pandas' own type for strings is slower to read and to write.
-        return pd.read_csv(io.BytesIO(data), dtype=object, keep_default_na=False)
+        return data
 
     def table_digest(self, name: str) -> str:
         """sha256 of a table as the point wrote it; empty if it wrote none."""

@@ -90,8 +90,13 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
             by_content.setdefault(point.table_digest(name), []).append(point)
         groups = list(by_content.values())
     extra = _extra_columns(groups, opening)
-    yield csv_bytes(pd.DataFrame(columns=[*extra, *columns]))
+    header = csv_bytes(pd.DataFrame(columns=[*extra, *columns]))
+    yield header
     for point, *_ in groups:
+        content = point.content(name)
+        if not extra and content.startswith(header):  # nothing stands beside its rows
+            yield content[len(header) :]
+            continue
         table = point.table(name)
         if list(table.columns) != columns:
             raise CollateError(
