@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -61,10 +62,10 @@ class FinishedPoint:
     @cached_property
     def opening(self) -> dict[str, str]:
         """The columns that open its tables, up to the seed, with its values."""
-        summary = self.table("summary")
-        names = list(summary.columns)
-        names = names[: names.index(LAST_OPENING) + 1]
-        return dict(zip(names, summary[names].iloc[0], strict=True))
+        # One row: pandas takes fifty times as long to begin.
+        row = next(csv.DictReader(io.StringIO(self.content("summary").decode())))
+        names = list(row)
+        return {name: row[name] for name in names[: names.index(LAST_OPENING) + 1]}
 
     def table(self, name: str) -> pd.DataFrame:
         """A table of strings; errors as of `content`."""
