@@ -182,7 +182,7 @@ def calibrate_on(
         ValueError: as of `mlci.preparation.prepare`.
     """
     tried, count = len(demonstrations) if tried is None else tried, len(model.regions)
-    mask = np.ones(count, dtype=bool) if hypotheses is None else as_mask(hypotheses, count)
+    mask = as_mask(hypotheses, count)
     regions = model.regions.select(mask)
     tasks = [demonstration.task for demonstration in demonstrations]
     prepared = prepare(

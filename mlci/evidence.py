@@ -216,6 +216,27 @@ def prior_shares(count: int, prior_none: float, prior: ArrayLike | None = None) 
     return (1 - prior_none) * weights / np.sum(weights)
 
 
+def log_marginal(
+    gain: ArrayLike, prior_none: float = 0.5, prior: ArrayLike | None = None
+) -> Floats:
+    """log(pi_0 + sum_i pi_i e^(L_i)) (...,): how likely demonstrations are, against none for sure.
+
+    Args:
+        gain: (..., C) L_i.
+        prior_none: as of `posterior`.
+        prior: likewise.
+
+    Raises:
+        ValueError: as of `posterior`.
+    """
+    gain = np.asarray(gain, dtype=float)
+    shares = np.append(prior_shares(gain.shape[-1], prior_none, prior), prior_none)
+    with np.errstate(divide="ignore"):
+        log_prior = np.log(shares)
+    none = np.zeros((*gain.shape[:-1], 1))
+    return np.asarray(logsumexp(np.concatenate([gain, none], axis=-1) + log_prior, axis=-1))
+
+
 def confidence(prior: float, avoidance: ArrayLike) -> float:
     """(12), corrected: P(C | A_N) = p / (p + (1 - p) prod_j (1 - Phi^j)).
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import comb, logsumexp
+from scipy.special import comb
 
-from mlci.evidence import prior_shares, rank_scores
+from mlci.evidence import log_marginal, rank_scores
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 
 
@@ -115,8 +115,7 @@ def claims(gains: Floats, prior_none: float) -> Floats:
         prior_none: prior probability that there is no constraint.
     """
     certain = np.sum(gains == np.inf, axis=1)  # these share everything
-    share = prior_shares(gains.shape[1], prior_none)
-    log_weight = np.log(share) + np.where(gains == np.inf, 0.0, gains)
-    log_all = np.logaddexp(logsumexp(log_weight, axis=1), np.log(prior_none))
-    best = np.exp(np.max(log_weight, axis=1) - log_all)
+    finite = np.where(gains == np.inf, 0.0, gains)
+    share = (1 - prior_none) / gains.shape[1]
+    best = share * np.exp(np.max(finite, axis=1) - log_marginal(finite, prior_none))
     return np.where(certain > 0, 1 / np.maximum(certain, 1), best)

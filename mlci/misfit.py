@@ -65,8 +65,8 @@ def misfit(
     """
     count, distance = np.sum(violated, axis=1), np.sum(np.abs(phi - violated), axis=1)
     count_p, distance_p = np.full((2, len(violated)), np.nan)
-    for j, distribution in enumerate(distributions):
-        if samples == 0 or not distribution.is_possible:
+    for j, distribution in enumerate(distributions if samples else ()):
+        if not distribution.is_possible:
             continue
         crossed = sample_crossings(distribution, samples, np.random.default_rng(0))
         drawn = crossed if hypotheses is None else crossed[:, hypotheses]

@@ -214,7 +214,7 @@ def prepare(
         ValueError: as of `infer`.
     """
     count = len(model.regions)
-    mask = np.ones(count, dtype=bool) if hypotheses is None else as_mask(hypotheses, count)
+    mask = as_mask(hypotheses, count)
     distributions = [
         TrajectoryDistribution.of_task(
             model, task, round_horizon=round_horizon, exact_ends=exact_ends

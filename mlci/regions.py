@@ -284,13 +284,13 @@ def _numbers(count: int) -> tuple[str, ...]:
     return tuple(map(str, range(count)))
 
 
-def as_mask(mask: ArrayLike, count: int) -> Bools:
-    """A mask over regions (count,), checked.
+def as_mask(mask: ArrayLike | None, count: int) -> Bools:
+    """A mask over regions (count,), checked; of all of them for None.
 
     Raises:
         ValueError: it has another shape, or holds anything but truth values.
     """
-    checked = np.asarray(mask)
+    checked = np.ones(count, dtype=bool) if mask is None else np.asarray(mask)
     if checked.dtype != bool or checked.shape != (count,):
         raise ValueError(
             f"a mask over {count} regions needs as many truth values, not {checked.dtype} of shape "

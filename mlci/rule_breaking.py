@@ -16,9 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import logsumexp
 
-from mlci.evidence import Rates, log_evidence, prior_shares, total_gain
+from mlci.evidence import Rates, log_evidence, log_marginal, total_gain
 from mlci.likelihood_interval import likelihood_interval
 from mlci.spaces import Floats, Ints
 
@@ -67,15 +66,13 @@ def estimate_rule_breaking(
     """
     # What is unavoidable has the gain of what is so but for rounding: finite, to be compared.
     alpha = np.maximum(avoidance, np.finfo(float).tiny)
-    with np.errstate(divide="ignore"):
-        log_prior = np.log(np.append(prior_shares(alpha.shape[-1], prior_none, prior), prior_none))
 
-    def log_marginal(eps: float) -> float:
+    def log_likelihood(eps: float) -> float:
         rates = Rates(model_error, float(eps))
         gain = total_gain(log_evidence(alpha, violated, rates))
-        return float(logsumexp(np.append(gain, 0.0) + log_prior))
+        return float(log_marginal(gain, prior_none, prior))
 
-    rate, lower, upper = likelihood_interval(log_marginal, _GRID)
+    rate, lower, upper = likelihood_interval(log_likelihood, _GRID)
     return RateEstimate(rate, lower, 1.0 if upper == _MOST else upper)
 
 
@@ -100,10 +97,8 @@ def gains_of_subsets(
     """
     alpha = np.maximum(avoidance, np.finfo(float).tiny)
     evidence = np.stack([log_evidence(alpha, violated, Rates(model_error, eps)) for eps in _GRID])
-    share, none = np.log((1 - prior_none) / alpha.shape[-1]), np.log(prior_none)
     gains = []
     for subset in subsets:
         by_rate = total_gain(evidence[:, subset])
-        marginal = np.logaddexp(logsumexp(by_rate, axis=-1) + share, none)
-        gains.append(by_rate[np.argmax(marginal)])
+        gains.append(by_rate[np.argmax(log_marginal(by_rate, prior_none))])
     return np.array(gains)

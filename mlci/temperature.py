@@ -27,10 +27,9 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.special import logsumexp
 
 from mlci.demonstrations import Demonstration
-from mlci.evidence import DEFAULT_MODEL_ERROR, Rates, log_evidence, prior_shares, total_gain
+from mlci.evidence import DEFAULT_MODEL_ERROR, Rates, log_evidence, log_marginal, total_gain
 from mlci.inference import Inference
 from mlci.inverse_dynamics import path_reward
 from mlci.likelihood_interval import DROP, likelihood_interval
@@ -204,10 +203,7 @@ class _Paths:
         # What is unavoidable has the gain of what is so but for rounding: finite, to be compared.
         alpha = np.where(self.inference.decided_by_cell, 1.0, np.maximum(alpha, _TINY))
         gain = total_gain(log_evidence(alpha, self.inference.violated, self.rates))
-        none = self.inference.prior_none
-        with np.errstate(divide="ignore"):
-            log_prior = np.log(np.append(prior_shares(len(gain), none), none))
-        return float(logsumexp(np.append(gain, 0.0) + log_prior))
+        return float(log_marginal(gain, self.inference.prior_none))
 
     @property
     def rates(self) -> Rates:

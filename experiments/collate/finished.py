@@ -62,7 +62,7 @@ class FinishedPoint:
     @cached_property
     def opening(self) -> dict[str, str]:
         """The columns that open its tables, up to the seed, with its values."""
-        # One row: pandas takes fifty times as long to begin.
+        # One row, for which pandas would take milliseconds to begin.
         row = next(csv.DictReader(io.StringIO(self.content("summary").decode())))
         names = list(row)
         return {name: row[name] for name in names[: names.index(LAST_OPENING) + 1]}
