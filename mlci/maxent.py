@@ -114,10 +114,10 @@ class TrajectoryDistribution:
         other = replace(self, model=model)
         if self.ends is not None:  # what takes the time has been done
             scale = self.model.temperature / model.temperature
-            vars(other)["_first_moves"] = self._first_moves.scaled(scale)
+            vars(other)["start_moves"] = self.start_moves.scaled(scale)
             if self.steps > 1:
                 vars(other)["_cells_between"] = self._cells_between
-                vars(other)["_last_moves"] = self._last_moves.scaled(scale)
+                vars(other)["goal_moves"] = self.goal_moves.scaled(scale)
         return other
 
     @cached_property
@@ -131,16 +131,16 @@ class TrajectoryDistribution:
             return log_z
         log_z[self.steps, self.goal] = 0.0
         if self.steps > 1:
-            add_moves(log_z, self.steps - 1, self._last_moves)
+            add_moves(log_z, self.steps - 1, self.goal_moves)
             soft_bellman_backup(
                 self.model, log_z, dict(enumerate(self._cells_between[:-1], start=1))
             )
-        add_moves(log_z, 0, self._first_moves)
+        add_moves(log_z, 0, self.start_moves)
         return log_z
 
     @cached_property
-    def _first_moves(self) -> EndMoves:
-        """The moves from the exact start."""
+    def start_moves(self) -> EndMoves:
+        """The moves from the exact start; into the goal where there is one step."""
         assert self.ends is not None
         if self.steps == 1:
             return only_moves(self.model, self.ends.start, self.goal, self.ends.goal)
@@ -149,10 +149,10 @@ class TrajectoryDistribution:
     @cached_property
     def _cells_between(self) -> list[Ints]:
         """Cells that can be occupied after 1 .. T-1 moves from the exact start."""
-        return reachable_cells(self.model, np.unique(self._first_moves.successor), self.steps - 2)
+        return reachable_cells(self.model, np.unique(self.start_moves.successor), self.steps - 2)
 
     @cached_property
-    def _last_moves(self) -> EndMoves:
+    def goal_moves(self) -> EndMoves:
         """The moves that end at the exact goal."""
         assert self.ends is not None
         return last_moves(self.model, self._cells_between[-1], self.goal, self.ends.goal)
@@ -176,8 +176,9 @@ class TrajectoryDistribution:
         """alpha_i (C,): the probability that a trajectory does not cross region i.
 
         alpha_t^i(s) = sum over the moves that do not cross i of pi_t(move | s) alpha_(t+1)^i(s'),
-        backwards from alpha_T = 1. Nothing is subtracted, so that a region which no trajectory
-        avoids has exactly 0, and -log alpha is exact where 1 - alpha would round to 1.
+        backwards from alpha_T = 1. Nothing is subtracted but where half or more is left, so that a
+        region which no trajectory avoids has exactly 0, and -log alpha is exact where 1 - alpha
+        would round to 1.
 
         Raises:
             ValueError: no trajectory reaches a goal.
@@ -196,11 +197,11 @@ class TrajectoryDistribution:
         if self.ends is None:
             alpha = avoidance_backwards(self.model, self.log_z, ones, self.steps, 0, first)
         elif self.steps == 1:
-            alpha = avoidance_of_moves(self.log_z, 0, self._first_moves, ones, first)
+            alpha = avoidance_of_moves(self.log_z, 0, self.start_moves, ones, first)
         else:
-            alpha = avoidance_of_moves(self.log_z, self.steps - 1, self._last_moves, ones, first)
+            alpha = avoidance_of_moves(self.log_z, self.steps - 1, self.goal_moves, ones, first)
             alpha = avoidance_backwards(self.model, self.log_z, alpha, self.steps - 1, 1, first)
-            alpha = avoidance_of_moves(self.log_z, 0, self._first_moves, alpha, first)
+            alpha = avoidance_of_moves(self.log_z, 0, self.start_moves, alpha, first)
         return alpha[0]
 
     def violation_probabilities(self) -> Floats:
@@ -223,14 +224,17 @@ class TrajectoryDistribution:
         cells = [np.full(count, self.start, dtype=np.int64)]
         moves = []
         for t in range(self.steps):
-            here, place = np.unique(cells[-1], return_inverse=True)
-            probabilities = move_probabilities(self.model, self.log_z, t, here)
-            cumulative = np.cumsum(probabilities[place], axis=1)
-            # Scaled by the last entry, so that rounding cannot lift a draw past every move.
-            draws = rng.random(count)[:, None] * cumulative[:, -1:]
-            moves.append(np.argmax(cumulative > draws, axis=1))
+            moves.append(self.draw_moves(t, cells[-1], rng))
             cells.append(self.model.successor[cells[-1], moves[-1]])
         return np.stack(cells, axis=1), np.stack(moves, axis=1)
+
+    def draw_moves(self, t: int, cells: Ints, rng: np.random.Generator) -> Ints:
+        """(B,) for each of some cells (B,) at step t, one of its moves, by the soft policy."""
+        here, place = np.unique(cells, return_inverse=True)
+        cumulative = np.cumsum(move_probabilities(self.model, self.log_z, t, here), axis=1)[place]
+        # Scaled by the last entry, so that rounding cannot lift a draw past every move.
+        draws = rng.random(len(cells))[:, None] * cumulative[:, -1:]
+        return np.argmax(cumulative > draws, axis=1)
 
     def _require_possible(self, consequence: str) -> None:
         """Raise where there is no distribution."""

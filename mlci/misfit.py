@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlci.end_moves import EndMoves, first_moves, last_moves, only_moves
+from mlci.end_moves import EndMoves
 from mlci.maxent import TrajectoryDistribution
-from mlci.recursions import move_probabilities
 from mlci.spaces import Bools, Floats, Ints
 from mlci.tabular import TabularModel
 
@@ -85,28 +84,24 @@ def sample_crossings(
     Raises:
         ValueError: no trajectory reaches a goal.
     """
-    model, steps, ends = distribution.model, distribution.steps, distribution.ends
-    if ends is None:
+    model, steps = distribution.model, distribution.steps
+    if distribution.ends is None:
         path, taken = distribution.sample(count, rng)
         return _crossed(model, path[:, :-1], taken)
     if not distribution.is_possible:
         raise ValueError("no trajectory reaches a goal: nothing to sample")
     log_z, cell = distribution.log_z, np.full(count, distribution.start)
-    if steps == 1:
-        only = only_moves(model, ends.start, distribution.goal, ends.goal)
-        return only.crosses[_draw(only, log_z[1], cell, rng)]
-    first = first_moves(model, ends.start)
+    first = distribution.start_moves
     move = _draw(first, log_z[1], cell, rng)
     crossed, cells, moves = first.crosses[move], [first.successor[move]], []
+    if steps == 1:
+        return crossed
     for t in range(1, steps - 1):
-        here, place = np.unique(cells[-1], return_inverse=True)
-        cumulative = np.cumsum(move_probabilities(model, log_z, t, here), axis=1)[place]
-        draws = rng.random(count)[:, None] * cumulative[:, -1:]
-        moves.append(np.argmax(cumulative > draws, axis=1))
+        moves.append(distribution.draw_moves(t, cells[-1], rng))
         cells.append(model.successor[cells[-1], moves[-1]])
     if moves:
         crossed |= _crossed(model, np.stack(cells[:-1], axis=1), np.stack(moves, axis=1))
-    last = last_moves(model, np.unique(cells[-1]), distribution.goal, ends.goal)
+    last = distribution.goal_moves
     return crossed | last.crosses[_draw(last, log_z[steps], cells[-1], rng)]
 
 
