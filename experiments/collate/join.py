@@ -94,7 +94,7 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
     yield header
     for point, *_ in groups:
         content = point.content(name)
-        if not extra and content.startswith(header):  # nothing stands beside its rows
+        if content.startswith(header):  # the same columns: nothing stands beside its rows
             yield content[len(header) :]
             continue
         table = point.table(name)
