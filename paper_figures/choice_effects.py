@@ -5,11 +5,10 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 
-from paper_figures.curves import draw_dots
+from paper_figures.curves import draw_dots, name_cases
 from paper_figures.rows import DEFAULT, PAPER, Unsuited
-from paper_figures.style import CELL_COLOURS, CELL_MARKS, GUIDE, PAGE, RC, VIOLATED, new_figure
+from paper_figures.style import CELL_COLOURS, CELL_MARKS, GUIDE, PAGE, RC, new_figure
 
 _KEYS = ("truth", "cells", "actions", "dt", "samples")
 TABLES = {
@@ -90,17 +89,11 @@ def draw(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame) 
                 if len(default):
                     x = factor * float(default[name].iloc[0])
                     axes.axvline(x, color=style["color"], linewidth=0.5, linestyle=":", zorder=0)
-            for line in range(1, len(names)):
-                axes.axhline(line - 0.5, color=VIOLATED, linewidth=0.6, zorder=0)
             axes.set_title(title)
             axes.set_xlabel(_UNITS[name])
             if limits:
                 axes.set_xlim(*limits)
-        grid[0].set_xscale("log")
-        grid[0].set_xticks((1, 2, 5, 10, 20, 50, 100), labels=["1", "2", "5", "10", "20", "50", ""])
-        grid[0].xaxis.set_minor_locator(NullLocator())
-        grid[0].set_yticks(range(len(names)), labels=names)
-        grid[0].set_ylim(len(names) - 0.5, -0.5)
+        name_cases(grid, names)
         handles, labels = grid[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(series))
     return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from paper_figures.rows import Unsuited, paper_rows
-from paper_figures.style import mark
+from paper_figures.style import VIOLATED, mark
 
 COLUMNS = (
     *("truth", "cells", "actions", "dt", "samples"),
@@ -101,6 +101,24 @@ def common_facts(rows: pd.DataFrame) -> Iterator[str]:
         "goals, and the mean is over those alone. No mark: it reaches none."
     )
     yield "Marks are moved a little aside of their dt, so that no bar hides another."
+
+
+def name_cases(grid: Sequence[Axes], names: Sequence[str]) -> None:
+    """A line a case across all panels, named at the first, whose values are ranks.
+
+    Args:
+        grid: panels that share their heights.
+        names: of the cases, from the top.
+    """
+    for axes in grid:
+        for line in range(1, len(names)):
+            axes.axhline(line - 0.5, color=VIOLATED, linewidth=0.6, zorder=0)
+    ranks = grid[0]
+    ranks.set_xscale("log")
+    ranks.set_xticks((1, 2, 5, 10, 20, 50, 100), labels=["1", "2", "5", "10", "20", "50", ""])
+    ranks.xaxis.set_minor_locator(NullLocator())
+    ranks.set_yticks(range(len(names)), labels=names)
+    ranks.set_ylim(len(names) - 0.5, -0.5)
 
 
 def draw_dots(axes: Axes, values: pd.DataFrame, y: pd.Series, style: dict[str, str]) -> None:

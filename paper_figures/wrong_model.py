@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 
-from paper_figures.curves import draw_dots
+from paper_figures.curves import draw_dots, name_cases
 from paper_figures.rows import DEFAULT, PAPER, Unsuited
-from paper_figures.style import DEMONSTRATION, PAGE, RC, TRUTH, VIOLATED, new_figure
+from paper_figures.style import DEMONSTRATION, PAGE, RC, TRUTH, new_figure
 
 TABLES = {
     "cases": ("truth", "case", "choice"),
@@ -92,15 +90,12 @@ def draw(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame) 
                 default = of_truth[of_truth["case"] == DEFAULT]
                 x = factor * float(default["right" if name == "claim" else name].iloc[0])
                 axes.axvline(x, color=colour, linewidth=0.5, linestyle=":", zorder=0)
-            for line in range(1, len(names)):
-                axes.axhline(line - 0.5, color=VIOLATED, linewidth=0.6, zorder=0)
             axes.set_title(title)
             axes.set_xlabel(unit)
             if factor == 100:
                 axes.set_xlim(-4, 104)
-        _rank_axis(grid[0])
-        grid[0].set_yticks(range(len(names)), labels=names)
-        grid[0].set_ylim(len(names) - 0.5, -0.5)
+        name_cases(grid, names)
+        grid[0].set_xlim(0.8, 110)
         handles, labels = grid[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(truths))
     return figure
@@ -123,11 +118,3 @@ def facts(cases: pd.DataFrame, measures: pd.DataFrame, rank_curve: pd.DataFrame)
             f"%, nearly impossible {100 * row.rare:.0f} %"
         )
     return "\n".join(lines)
-
-
-def _rank_axis(axes: Axes) -> None:
-    """A logarithmic axis of ranks."""
-    axes.set_xscale("log")
-    axes.set_xticks((1, 2, 5, 10, 20, 50, 100), labels=["1", "2", "5", "10", "20", "50", ""])
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlim(0.8, 110)
