@@ -81,6 +81,7 @@ def infer(settings: RecordedSettings) -> int:
         calibration=forecast_map,
         exact_ends=exact_ends,
         round_horizon=rounded,
+        crossing=settings.crossing.crossing(),
     )
     if settings.inference.rule_breaking == ESTIMATE:
         inference = inference.with_rule_breaking()

@@ -28,6 +28,7 @@ V       values                safe set's value function                  unit of
 """
 
 from mlci.calibration import Calibration, calibrate
+from mlci.crossings import Crossing
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.diagnosis import Diagnosis, diagnose
@@ -55,6 +56,7 @@ from mlci.tabular import TabularModel, action_grid, discretize
 __all__ = [
     "Box",
     "Calibration",
+    "Crossing",
     "Demonstration",
     "Diagnosis",
     "DoubleIntegrator",

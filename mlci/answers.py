@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,7 @@ class Answer:
             if estimate is None
             else f"temperature {self.temperature:g} ({estimate.summary()})",
             f"paths begin and end at {'states' if self.exact_ends else 'cells'}",
+            str(inference.crossing),
         ]
 
     def record(self) -> dict[str, Any]:
@@ -97,6 +98,7 @@ class Answer:
                 ],
             },
             "assumptions": self.assumptions,
+            "crossing": asdict(inference.crossing),
             "demonstrations": [
                 {
                     "name": name,

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mlci.crossings import ANY, Crossing, crossed
 from mlci.demonstrations import REACHED, Demonstration, Task
 from mlci.demonstrator import Outcome, Trial, demonstrate, first_guesses
 from mlci.forecast_scores import ForecastScores, score_forecasts
@@ -84,6 +85,7 @@ def calibrate(
     goal_tolerance: float = REACHED,
     wind: bool = True,
     limit: Box | None = None,
+    crossing: Crossing = ANY,
     n_jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
@@ -106,6 +108,7 @@ def calibrate(
         goal_tolerance: as of `demonstrate`.
         wind: as of `demonstrate`.
         limit: as of `demonstrate`.
+        crossing: as of `mlci.preparation.infer`.
         n_jobs: tasks that are worked on at once; -1 is one a core. The result is the same.
         progress: called with how many tasks are done, and of how many.
 
@@ -152,6 +155,7 @@ def calibrate(
         tried=trials,
         hypotheses=hypotheses,
         exact_ends=exact_ends,
+        crossing=crossing,
         n_jobs=n_jobs,
         progress=progress,
     )
@@ -164,6 +168,7 @@ def calibrate_on(
     tried: int | None = None,
     hypotheses: ArrayLike | None = None,
     exact_ends: bool = True,
+    crossing: Crossing = ANY,
     n_jobs: int = 1,
     progress: Progress | None = None,
 ) -> Calibration:
@@ -175,6 +180,7 @@ def calibrate_on(
         tried: how many tasks were tried; by default as many as there are demonstrations.
         hypotheses: (C,) mask over the model's regions; None takes all.
         exact_ends: as of `mlci.preparation.infer`.
+        crossing: as of `mlci.preparation.infer`.
         n_jobs: tasks that are worked on at once.
         progress: called with how many tasks are done, and of how many.
 
@@ -193,21 +199,23 @@ def calibrate_on(
     if used < FEWEST:
         return Calibration(tried, used)
     alpha = prepared.avoidance[can]
-    crossed = np.stack([regions.violated_by(path.states) for path in demonstrations])[can]
+    paths = [each.states for each in demonstrations]
+    times = [each.dt * np.arange(len(each.states)) for each in demonstrations]
+    hits = crossed(regions, paths, times, crossing)[can]
     open_pairs = ~(certain_by_ends(regions, tasks) | prepared.decided_by_cell)[can]
     counts = open_pairs & is_possible(alpha)
     if not (counts[:half].any() and counts[half:].any()):
         return Calibration(tried, used)
-    first = fit_map(alpha[:half], crossed[:half], sizes, counts[:half])
+    first = fit_map(alpha[:half], hits[:half], sizes, counts[:half])
     calibrated = first.avoidance(alpha[half:], sizes)
     beyond = open_pairs & ~counts
     return Calibration(
         tried,
         used,
-        fit_map(alpha, crossed, sizes, counts),
-        score_forecasts(alpha[half:], crossed[half:], counts[half:]),
-        score_forecasts(calibrated, crossed[half:], counts[half:]),
-        float(np.mean(crossed[beyond])) if beyond.any() else None,
+        fit_map(alpha, hits, sizes, counts),
+        score_forecasts(alpha[half:], hits[half:], counts[half:]),
+        score_forecasts(calibrated, hits[half:], counts[half:]),
+        float(np.mean(hits[beyond])) if beyond.any() else None,
     )
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mlci.credible_sets import CredibleSet, credible_set
+from mlci.crossings import ANY, Crossing
 from mlci.evidence import PAPER, Ranking, Rates, log_evidence, rank_constraints
 from mlci.forecasts import ForecastMap, is_possible, region_sizes
 from mlci.regions import Regions
@@ -42,6 +43,7 @@ class Inference:
         decided_by_cell: (N, C) pairs that are no evidence, since a hypothesis is certain to be
             entered only because of the cell in which the task starts or ends; none by default. See
             `mlci.evidence.decided_by_cell`.
+        crossing: what counted as violating a hypothesis.
 
     Raises:
         ValueError: shapes that disagree.
@@ -57,6 +59,7 @@ class Inference:
     calibration: ForecastMap | None = None
     rule_breaking: RateEstimate | None = None
     decided_by_cell: Bools = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    crossing: Crossing = ANY
 
     def __post_init__(self) -> None:
         shape = len(self.names), len(self.hypotheses)

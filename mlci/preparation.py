@@ -14,6 +14,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
+from mlci.crossings import ANY, Crossing, crossed
 from mlci.demonstrations import REACHED, Demonstration, Task, departures
 from mlci.evidence import DEFAULT_MODEL_ERROR, Rates, decided_by_cell
 from mlci.forecasts import ForecastMap
@@ -75,6 +76,7 @@ class PreparedInference:
         rates: Rates | None = None,
         calibration: ForecastMap | None = None,
         tolerance: float = REACHED,
+        crossing: Crossing = ANY,
     ) -> Inference:
         """Rank the hypotheses by the demonstrations that have arrived, equations (4) to (6).
 
@@ -89,6 +91,7 @@ class PreparedInference:
             calibration: as of `infer`.
             tolerance: how far a path may start from its task's start and end from its goal,
                 Euclidean in raw units.
+            crossing: what counts as entering a hypothesis; a touch by default.
 
         Raises:
             ValueError: a task that is not known, not one task and name for each path, or a path
@@ -115,12 +118,13 @@ class PreparedInference:
             self.hypotheses,
             labels,
             self.avoidance[numbers],
-            _violations(self.hypotheses, paths),
+            _violations(self.hypotheses, paths, steps, crossing),
             self.reachable[numbers],
             prior_none,
             default if rates is None else rates,
             calibration,
             decided_by_cell=self.decided_by_cell[numbers],
+            crossing=crossing,
         )
 
     def _path(self, path: ArrayLike, dt: float, number: int, name: str, tolerance: float) -> Floats:
@@ -149,6 +153,7 @@ def infer(
     round_horizon: bool = False,
     exact_ends: bool = True,
     tolerance: float = REACHED,
+    crossing: Crossing = ANY,
     n_jobs: int = 1,
     progress: Progress | None = None,
 ) -> Inference:
@@ -167,6 +172,7 @@ def infer(
         exact_ends: let trajectories begin and end at states, so that a region is not certain to be
             entered only because it holds a cell's centre. The paper's begin and end at cells.
         tolerance: how far a demonstration may end from its task's goal, Euclidean in raw units.
+        crossing: what counts as entering a hypothesis; a touch by default.
         n_jobs: tasks that are worked on at once; -1 is one a core. The result is the same.
         progress: called with how many tasks are done, and of how many.
 
@@ -195,6 +201,7 @@ def infer(
         rates=rates,
         calibration=calibration,
         tolerance=tolerance,
+        crossing=crossing,
     )
 
 
@@ -248,10 +255,17 @@ def _avoidance_probabilities(distribution: TrajectoryDistribution) -> tuple[bool
     return True, alpha, decided_by_cell(between_cells.avoidance_probabilities(), alpha)
 
 
-def _violations(hypotheses: Regions, paths: Sequence[ArrayLike]) -> Bools:
+def _violations(
+    hypotheses: Regions, paths: Sequence[ArrayLike], dt: Floats, crossing: Crossing
+) -> Bools:
     """D (N, C): which hypotheses each path violates."""
     violated = np.zeros((len(paths), len(hypotheses)), dtype=bool)
-    if len({np.shape(path) for path in paths}) == 1:  # all at once is quicker
+    if not crossing.is_any:
+        times = [
+            step * np.arange(len(np.asarray(path))) for path, step in zip(paths, dt, strict=True)
+        ]
+        violated[:] = crossed(hypotheses, paths, times, crossing)
+    elif len({np.shape(path) for path in paths}) == 1:  # all at once is quicker
         violated[:] = hypotheses.violated_by(np.stack(paths))
     else:
         for row, path in zip(violated, paths, strict=True):

@@ -203,8 +203,8 @@ class Regions:
         keys = [np.empty(0, dtype=np.int64)]
         for first in range(0, len(starts), _CHORDS_AT_ONCE):
             part = slice(first, first + _CHORDS_AT_ONCE)
-            chord, region = self._chord_hits(self.space.wrap(starts[part]), steps[part])
-            key = owner[part][chord] * len(self) + region
+            chord, image, *_ = self.chord_hits(self.space.wrap(starts[part]), steps[part])
+            key = owner[part][chord] * len(self) + self.images[0][image]
             begin, end = owner[part].min() * len(self), (owner[part].max() + 1) * len(self)
             entered = np.zeros(end - begin, dtype=bool)
             entered[key - begin] = True
@@ -216,9 +216,9 @@ class Regions:
             (np.ones(len(rows), dtype=bool), columns, ends), shape=(owners, len(self))
         )
 
-    def _chord_hits(self, starts: Floats, steps: Floats) -> tuple[Ints, Ints]:
-        """Pairs (chord, region) that meet; starts wrapped."""
-        region, lower, upper = self._images
+    def chord_hits(self, starts: Floats, steps: Floats) -> tuple[Ints, Ints, Floats, Floats]:
+        """Pairs (chord, image) that meet, and shares of the chord between; starts wrapped."""
+        region, lower, upper = self.images
         low, high = np.minimum(starts, starts + steps), np.maximum(starts, starts + steps)
         near = np.ones((len(region), len(starts)), dtype=bool)
         for d, first, last, which in self._sides:
@@ -237,16 +237,16 @@ class Regions:
             np.maximum(enter, np.where(still, -np.inf, np.minimum(to_lower, to_upper)), out=enter)
             np.minimum(leave, np.where(still, np.inf, np.maximum(to_lower, to_upper)), out=leave)
         hit = enter < leave
-        return chord[hit], region[image[hit]]
+        return chord[hit], image[hit], enter[hit], leave[hit]
 
     @cached_property
     def _sides(self) -> list[tuple[int, Floats, Floats, Ints]]:
         """The distinct sides in each dimension that some region bounds, and whose they are.
 
         Few distinct sides make many boxes: a chord is compared with each side once. Returns the
-        dimension, the sides' first and last ends, and (I,) the side of each of the `_images`.
+        dimension, the sides' first and last ends, and (I,) the side of each of the `images`.
         """
-        _, lower, upper = self._images
+        _, lower, upper = self.images
         found = []
         for d in np.flatnonzero(np.any(np.isfinite(lower), axis=0)):
             ends = np.stack([lower[:, d], upper[:, d]], axis=1)
@@ -255,7 +255,7 @@ class Regions:
         return found
 
     @cached_property
-    def _images(self) -> tuple[Ints, Floats, Floats]:
+    def images(self) -> tuple[Ints, Floats, Floats]:
         """The regions' copies, whole periods apart, that a wrapped chord can reach.
 
         Returns their region numbers (I,) and corners (I, n).

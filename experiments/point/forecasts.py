@@ -89,16 +89,19 @@ def recorded_calibration(
 ) -> Calibration:
     """The map for recorded demonstrations, by tasks like theirs; from the store or computed."""
     tasks = [demonstration.task for demonstration in demonstrations]
-    exact_ends = settings.inference.exact_ends
+    exact_ends, crossing = settings.inference.exact_ends, settings.crossing.crossing()
     numbers = [[*task.start, *task.goal.lower, *task.goal.upper, task.horizon] for task in tasks]
     depends = (
         model_inputs(settings, settings.candidates),
         [[repr(float(number)) for number in row] for row in numbers],  # infinite sides are no JSON
         exact_ends,
+        dataclasses.astuple(crossing),
     )
 
     def compute() -> dict[str, np.ndarray]:
-        return _arrays(calibrate(model, tasks, trials=TRIALS, exact_ends=exact_ends))
+        return _arrays(
+            calibrate(model, tasks, trials=TRIALS, exact_ends=exact_ends, crossing=crossing)
+        )
 
     modules = [mlci.calibration, system_module(settings.model), sys.modules[__name__]]
     return _calibration(store.get("recorded_forecasts", depends, modules, compute))

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from mlci.crossings import Crossing, crossed
 from mlci.demonstrations import REACHED, Demonstration, Task, departures
 from mlci.evidence import DEFAULT_MODEL_ERROR, PAPER, Ranking, Rates, log_evidence, rank_constraints
 from mlci.grids import Grid
@@ -320,3 +321,16 @@ def test_what_only_a_cell_makes_certain_is_no_evidence_and_is_named() -> None:
     violating = replace(inference, violated=np.ones((1, 2), dtype=bool))
     assert violating.gain[0] == -np.inf
     assert not any("no evidence" in warning for warning in violating.warnings)
+
+
+def test_a_crossing_may_be_asked_to_be_deep_and_to_last(model: TabularModel) -> None:
+    demonstrations = [demonstration(task, seed) for seed, task in enumerate([2, 0])]
+    paths = [each.states for each in demonstrations]
+    times = [each.dt * np.arange(len(each.states)) for each in demonstrations]
+    counts = Crossing(depth=0.2, time=0.3)
+    inference = infer(model, demonstrations, crossing=counts)
+    assert inference.crossing == counts
+    np.testing.assert_array_equal(inference.violated, crossed(HYPOTHESES, paths, times, counts))
+    touched = infer(model, demonstrations).violated
+    assert np.all(inference.violated <= touched)
+    assert 0 < inference.violated.sum() < touched.sum()

@@ -46,6 +46,7 @@ Number = Annotated[float, _READ]
 Positive = Annotated[float, Field(gt=0), _READ]
 NotNegative = Annotated[float, Field(ge=0), _READ]
 Share = Annotated[float, Field(ge=0, lt=1), _READ]
+DepthShare = Annotated[float, Field(ge=0, lt=0.5), _READ]
 Probability = Annotated[float, Field(gt=0, lt=1), _READ]
 Duration = Annotated[float, Field(gt=0, le=1e8), _READ]  # [s], up to three years
 

@@ -9,7 +9,9 @@ from pydantic.dataclasses import dataclass
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
+    DepthShare,
     Flag,
+    NotNegative,
     Number,
     Positive,
     Word,
@@ -19,6 +21,27 @@ from experiments.config.settings.kinds import (
 from experiments.config.settings.parts import Region
 from experiments.config.settings.point import ModelSettings
 from experiments.config.settings.study import RESULTS
+from mlci.crossings import Crossing
+
+
+@dataclass(frozen=True, config=STRICT)
+class CrossingSettings:
+    """What counts as entering a hypothesis."""
+
+    depth: Annotated[
+        DepthShare,
+        about(
+            "how deep a path must get into a hypothesis for that to count; 0 counts every touch",
+            "share of its width",
+        ),
+    ]
+    time: Annotated[
+        NotNegative, about("how long it must stay inside at a time for that to count", "s")
+    ]
+
+    def crossing(self) -> Crossing:
+        """The same for the inference."""
+        return Crossing(self.depth, self.time)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -48,6 +71,7 @@ class RecordedSettings(ModelSettings):
         Flag,
         about("take the nearest whole number of time steps where dt does not divide a duration"),
     ]
+    crossing: CrossingSettings
     estimate_temperature: Annotated[
         Flag,
         about(
