@@ -6,11 +6,12 @@ import numpy as np
 import pandas as pd
 
 from experiments.collate.finished import LAST_OPENING
-from experiments.collate.intervals import TAILS, Floats
+from experiments.collate.intervals import TAILS, Floats, generator
 from experiments.collate.reliability import EDGES, NO_TRUTH, set_resamples, weighted
 
 PAPER, FIXED = "paper", "model error"  # the paper's evidence; how kinds with a fixed rate begin
 LEAST = 1e-10  # a posterior below counts as this, where its logarithm is averaged
+CHANCES = 1000  # draws of what would be right if posteriors came true
 
 
 def evidence_kinds(evidence: pd.DataFrame) -> pd.DataFrame:
@@ -26,7 +27,9 @@ def evidence_kinds(evidence: pd.DataFrame) -> pd.DataFrame:
     Returns:
         The opening columns but those of the truth and `seed`; `demonstrations`, `evidence`; number
         of `worlds` and `sets`; and with `_low` and `_high`: `off_by`, the mean distance between
-        the posterior of the best hypothesis and how often it is right, over bins of the posterior;
+        the posterior of the best hypothesis and how often it is right, over bins of the posterior,
+        with `by_chance` and `by_chance_high`, the mean and the 95 % quantile of what it would be
+        for as many sets if every posterior came true;
         `best`, `right`; `log_truth`, the mean log posterior of what is true, and `log_over_paper`
         and `log_over_fixed`, how much more that is than with the paper's evidence and with the best
         of the fixed rates; `top`, the share of truths among the first, and `top_over_paper`.
@@ -57,6 +60,8 @@ def evidence_kinds(evidence: pd.DataFrame) -> pd.DataFrame:
             for name, drawn in values.items():
                 low, high = np.nanquantile(drawn[1:], TAILS)
                 row |= {name: drawn[0], f"{name}_low": low, f"{name}_high": high}
+            chance = _off_by_chance(kinds[kind], [*map(str, key), kind])
+            row |= {"by_chance": np.mean(chance), "by_chance_high": np.quantile(chance, 0.95)}
             rows.append(row)
     return pd.DataFrame(rows)
 
@@ -71,11 +76,6 @@ def _scores(rows: pd.DataFrame, counts: Floats) -> dict[str, Floats]:
     weights = counts * rows["weight"].to_numpy()
     total = weights.sum(axis=1)
     best, right = rows["best"].to_numpy(), rows["right"].to_numpy()
-    place = np.clip(np.searchsorted(EDGES, best, side="right"), 1, len(EDGES) - 1)
-    distance = sum(
-        np.abs(weights[:, place == number] @ (best - right)[place == number])
-        for number in np.unique(place)
-    )
     has_truth = (rows["world"] != NO_TRUTH).to_numpy()
     with np.errstate(invalid="ignore"):
         top = (weights[:, has_truth] @ rows["top"].to_numpy(dtype=float)[has_truth]) / weights[
@@ -83,9 +83,26 @@ def _scores(rows: pd.DataFrame, counts: Floats) -> dict[str, Floats]:
         ].sum(axis=1)
     log_truth = np.log(np.maximum(rows["of_truth"].to_numpy(), LEAST))
     return {
-        "off_by": distance / total,
+        "off_by": _distance(weights, best, best - right) / total,
         "best": weights @ best / total,
         "right": weights @ right / total,
         "log_truth": weights @ log_truth / total,
         "top": top,
     }
+
+
+def _off_by_chance(rows: pd.DataFrame, key: list[str]) -> Floats:
+    """`off_by` (B,) where each best hypothesis is right as often as its posterior says."""
+    weights, best = rows["weight"].to_numpy(), rows["best"].to_numpy()
+    right = generator(key).random((CHANCES, len(best))) < best
+    return _distance(weights, best, best - right) / weights.sum()
+
+
+def _distance(weights: Floats, best: Floats, excess: Floats) -> Floats:
+    """(B,) the weighed excesses (S,) or (B, S), summed in each bin of the posterior, as distances."""
+    place = np.clip(np.searchsorted(EDGES, best, side="right"), 1, len(EDGES) - 1)
+    weighed = weights * excess
+    return sum(
+        (np.abs(weighed[..., place == number].sum(axis=-1)) for number in np.unique(place)),
+        start=np.zeros(len(weighed)),
+    )

@@ -108,6 +108,12 @@ def rank_curve(ranks: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def generator(key: Sequence[str]) -> np.random.Generator:
+    """A random stream of its own for each key."""
+    state = np.frombuffer(hashlib.sha256("\0".join(key).encode()).digest(), dtype="<u4")
+    return np.random.default_rng(state)
+
+
 def resamples(sizes: Ints, key: Sequence[str]) -> Ints:
     """How often each row is drawn by each resample of the two-level bootstrap.
 
@@ -118,8 +124,7 @@ def resamples(sizes: Ints, key: Sequence[str]) -> Ints:
     Returns:
         (B, N) counts of the N rows in B resamples.
     """
-    state = np.frombuffer(hashlib.sha256("\0".join(key).encode()).digest(), dtype="<u4")
-    rng = np.random.default_rng(state)
+    rng = generator(key)
     first = np.concatenate([[0], np.cumsum(sizes)])
     seed = rng.integers(0, len(sizes), (RESAMPLES, len(sizes)))
     counts = np.empty((RESAMPLES, first[-1]), dtype=np.intp)

@@ -27,37 +27,33 @@ def evidence_table(
 ) -> pd.DataFrame:
     """A row a set, number of demonstrations and kind of evidence.
 
+    Sets of one size share no demonstration, and there are as many of them as there can be.
+
     Args:
         settings: the point; its truth is one hypothesis, or nothing.
         point: what its demonstrations say, with exact ends.
         calibration: of the forecasts with exact ends.
 
     Returns:
-        `prior` of the world, its number of `sets`; `set`, `demonstrations`, `evidence`; `best`, the
-        posterior of the most likely hypothesis, and whether it is `right`; `of_truth`, the
+        `prior` of the world, its number of `sets` of that size; `set`, `demonstrations`, `evidence`;
+        `best`, the posterior of the most likely hypothesis, and whether it is `right`; `of_truth`, the
         posterior of what is true; whether the truth is in the `top`, nothing where nothing is
         forbidden; how many hypotheses are still `feasible`.
     """
     kinds, cell = _kinds(settings, point, calibration), settings.truth.cell
     hypotheses, prior_none = len(point.inference.hypotheses), point.inference.prior_none
-    longest = max(settings.calibration.demonstrations)
-    names = point.inference.names
-    firsts = range(0, max(1, len(names) - longest + 1), longest)  # one may be short
-    opening = {
-        "prior": prior_none if cell is None else (1 - prior_none) / hypotheses,
-        "sets": len(firsts),
-    }
+    prior = prior_none if cell is None else (1 - prior_none) / hypotheses
     rows = []
-    for number, first in enumerate(firsts):
-        for count in settings.calibration.demonstrations:
-            if count > len(names):
-                continue
+    for count in settings.calibration.demonstrations:
+        sets = len(point.inference.names) // count
+        for number, first in enumerate(range(0, sets * count, count)):
             for kind, inference in kinds.items():
                 ranking = inference.of(slice(first, first + count)).ranking
                 best = int(ranking.order[0])
                 rows.append(
                     {
-                        **opening,
+                        "prior": prior,
+                        "sets": sets,
                         "set": number,
                         "demonstrations": count,
                         "evidence": kind,

@@ -11,6 +11,7 @@ STUDY = "calibration"
 LIMITS = ("", "_low", "_high")
 SCORES = ("off_by", "log_truth", "log_over_paper", "log_over_fixed", "top", "top_over_paper")
 COLUMNS = ("demonstrations", "evidence", "worlds", "sets", "best", "right")
+CHANCE = ("by_chance", "by_chance_high")
 # Criterion: which kind, at how many demonstrations, and how far off it may be at most.
 MOST_OFF = 0.05
 JUDGED = ("calibrated", (5, 10))
@@ -28,7 +29,7 @@ def section(results: Results) -> str:
     Raises:
         Missing: the study `calibration` is not there yet.
     """
-    columns = (*COLUMNS, *(f"{name}{end}" for name in SCORES for end in LIMITS))
+    columns = (*COLUMNS, *CHANCE, *(f"{name}{end}" for name in SCORES for end in LIMITS))
     kinds = results.table(STUDY, "evidence_kinds", columns)
     if kinds.empty:
         raise Missing(STUDY, f"the study `{STUDY}` compares no kinds of evidence")
@@ -38,22 +39,29 @@ def section(results: Results) -> str:
             row["demonstrations"],
             number(row["best"]),
             number(row["right"]),
-            *(_value(row, name) for name in ("off_by", "log_truth", "log_over_paper")),
+            _value(row, "off_by"),
+            f"{row['by_chance']:.3f} (95 %: {row['by_chance_high']:.3f})",
+            *(_value(row, name) for name in ("log_truth", "log_over_paper")),
             _value(row, "log_over_fixed"),
             between(*(percent(row[f"top{end}"]) for end in LIMITS)),
         ]
         for _, row in kinds.sort_values("demonstrations", kind="stable").iterrows()
     ]
-    head = ["evidence", "demonstrations", "probability", "right", "off by", "log of the truth"]
+    head = ["evidence", "demonstrations", "probability", "right", "off by", "by chance"]
+    head += ["log of the truth"]
     head += ["over the paper's", "over the best fixed rate", "truth in the top"]
     meant = "; ".join(f"*{name}*: {words}" for name, words in _WORDS.items())
-    first = kinds.iloc[0]
+    sizes = kinds.drop_duplicates("demonstrations").sort_values("demonstrations")
+    sets = ", ".join(
+        f"{row['sets']:.0f} of {row['demonstrations']:.0f}" for _, row in sizes.iterrows()
+    )
     return (
-        f"The same sets of demonstrations in {first['worlds']:.0f} points of simulated worlds "
-        f"({first['sets']:.0f} sets of each size), half of the prior without a constraint and half "
-        f"shared by the hypotheses, read with different kinds of evidence. {meant}; *model error*: "
+        f"The same sets of demonstrations in {kinds.iloc[0]['worlds']:.0f} points of simulated "
+        f"worlds (disjoint sets: {sets} demonstrations), half of the prior without a constraint and "
+        f"half shared by the hypotheses, read with different kinds of evidence. {meant}; *model error*: "
         "a fixed rate eta. *Probability* is that of the most likely hypothesis, *off by* its "
-        "distance to how often it is right, by bins; *log of the truth* the mean log posterior of "
+        "distance to how often it is right, by bins, and *by chance* what that would be for as "
+        "many sets if every probability came true; *log of the truth* the mean log posterior of "
         "what is true [nat], 1e-10 at least, and its differences are between the same sets.\n\n"
         + table(head, lines)
         + "\n"

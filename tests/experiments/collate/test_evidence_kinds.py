@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.collate.evidence_kinds import LEAST, evidence_kinds
+from experiments.collate.evidence_kinds import CHANCES, LEAST, evidence_kinds
 from experiments.collate.intervals import resamples
 
 # Two worlds with a truth and three sets without: best, right, of_truth, top.
@@ -87,3 +89,21 @@ def test_intervals_are_over_worlds_and_over_sets_without_a_truth() -> None:
     shares = [np.sum(w * right) / np.sum(w) for w in counts * WEIGHTS]
     expected = np.quantile(shares, [0.025, 0.975])
     assert [row["right_low"], row["right_high"]] == pytest.approx(expected.tolist())
+
+
+def test_what_chance_leaves_is_over_all_outcomes_by_their_probability() -> None:
+    (row,) = evidence_kinds(table(paper=1.0)).to_dict("records")
+    best, bins = np.array([each[0] for each in SETS.values()]), ((0, 1), (2, 4), (3,))
+    off, weight = [], []
+    for right in itertools.product((0, 1), repeat=5):
+        excess = WEIGHTS * (best - np.array(right))
+        off.append(sum(abs(excess[list(inside)].sum()) for inside in bins))
+        weight.append(np.prod(np.where(right, best, 1 - best)))
+    mean = np.dot(weight, off)
+    spread = np.sqrt(np.dot(weight, np.square(off)) - mean**2)
+    assert row["by_chance"] == pytest.approx(mean, abs=4 * spread / np.sqrt(CHANCES))
+    order = np.argsort(off)
+    below = np.cumsum(np.array(weight)[order])
+    # Between the quantiles that 1000 draws can take for the 95 % one.
+    low, high = (np.array(off)[order][np.searchsorted(below, share)] for share in (0.92, 0.98))
+    assert low <= row["by_chance_high"] <= high

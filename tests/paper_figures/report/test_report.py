@@ -371,7 +371,7 @@ def test_evidence_is_compared_and_judged(tmp_path: Path) -> None:
     scores = dict.fromkeys(section_evidence.SCORES, 0.02)
     rows = [
         {"demonstrations": size, "evidence": kind, "worlds": 120, "sets": 200, "best": 0.1}
-        | {"right": right}
+        | {"right": right, "by_chance": 0.015, "by_chance_high": 0.03}
         | {f"{name}{end}": value for name, value in scores.items() for end in ("", "_low", "_high")}
         for size, right in ((5, 0.1), (10, 0.1), (20, 0.3))
         for kind in ("paper", "calibrated")
@@ -379,7 +379,7 @@ def test_evidence_is_compared_and_judged(tmp_path: Path) -> None:
     table = pd.DataFrame(rows)
     write(tmp_path, "calibration", evidence_kinds=table)
     text = section_evidence.section(Results(tmp_path))
-    line = "| calibrated | 5 | 0.100 | 0.100 | 0.020 [0.020, 0.020] |"
+    line = "| calibrated | 5 | 0.100 | 0.100 | 0.020 [0.020, 0.020] | 0.015 (95 %: 0.030) |"
     assert line in text
     assert "off by 0.0200 after 5, 0.0200 after 10 demonstrations, within 0.05." in text
     assert "After 20 it is too modest (0.100 probable, 0.300 right)" in text
