@@ -99,7 +99,7 @@ def _off_by_chance(rows: pd.DataFrame, key: list[str]) -> Floats:
 
 
 def _distance(weights: Floats, best: Floats, excess: Floats) -> Floats:
-    """(B,) the weighed excesses (S,) or (B, S), summed in each bin of the posterior, as distances."""
+    """(B,) how far weighed excesses (S,) or (B, S) are from 0, over bins of the posterior."""
     place = np.clip(np.searchsorted(EDGES, best, side="right"), 1, len(EDGES) - 1)
     weighed = weights * excess
     return sum(

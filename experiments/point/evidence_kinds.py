@@ -35,10 +35,10 @@ def evidence_table(
         calibration: of the forecasts with exact ends.
 
     Returns:
-        `prior` of the world, its number of `sets` of that size; `set`, `demonstrations`, `evidence`;
-        `best`, the posterior of the most likely hypothesis, and whether it is `right`; `of_truth`, the
-        posterior of what is true; whether the truth is in the `top`, nothing where nothing is
-        forbidden; how many hypotheses are still `feasible`.
+        `prior` of the world, its number of `sets` of that size; `set`, `demonstrations`,
+        `evidence`; `best`, the posterior of the most likely hypothesis, and whether it is `right`;
+        `of_truth`, the posterior of what is true; whether the truth is in the `top`, nothing where
+        nothing is forbidden; how many hypotheses are still `feasible`.
     """
     kinds, cell = _kinds(settings, point, calibration), settings.truth.cell
     hypotheses, prior_none = len(point.inference.hypotheses), point.inference.prior_none

@@ -57,8 +57,9 @@ def section(results: Results) -> str:
     )
     return (
         f"The same sets of demonstrations in {kinds.iloc[0]['worlds']:.0f} points of simulated "
-        f"worlds (disjoint sets: {sets} demonstrations), half of the prior without a constraint and "
-        f"half shared by the hypotheses, read with different kinds of evidence. {meant}; *model error*: "
+        f"worlds (disjoint sets: {sets} demonstrations), half of the prior without a constraint "
+        "and half shared by the hypotheses, read with different kinds of evidence. "
+        f"{meant}; *model error*: "
         "a fixed rate eta. *Probability* is that of the most likely hypothesis, *off by* its "
         "distance to how often it is right, by bins, and *by chance* what that would be for as "
         "many sets if every probability came true; *log of the truth* the mean log posterior of "
