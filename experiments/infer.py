@@ -23,6 +23,7 @@ from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, read_recorded_config
 from experiments.config.settings import ESTIMATE, RecordedSettings
 from experiments.console import answer_lines, diagnosis_lines, entry
+from experiments.page.document import page
 from experiments.point.forecasts import recorded_calibration
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.truth_tables import dimension_table
@@ -115,6 +116,7 @@ def infer(settings: RecordedSettings) -> int:
         print(line)
     folder = _save(settings, demonstrations, problems, result, ranking)
     print(f"written: {folder}")
+    print(f"page: {folder / 'page.html'}")
     return FAILED if problems else DONE
 
 
@@ -192,6 +194,10 @@ def _save(
         replace_file(folder / f"{name}.csv", csv_bytes(table))
     save(hypothesis_map.draw(ranking, paths, dimension_table(space)), folder / "map")
     replace_file(folder / "answer.json", _json_bytes(result.record()))
+    title = f"What was avoided: {_source(settings)}"
+    unused = [f"not used: {problem}" for problem in problems]
+    content = page(result, demonstrations, title=title, doubtful=unused)
+    replace_file(folder / "page.html", content.encode())
     record = {
         **made_from,
         "demonstrations": settings.demonstrations,
@@ -200,6 +206,14 @@ def _save(
     }
     replace_file(folder / "record.json", _json_bytes(record))
     return folder
+
+
+def _source(settings: RecordedSettings) -> str:
+    """What demonstrations were read from, as far as its name tells."""
+    given = settings.demonstrations
+    return ", ".join(
+        Path(each).name or each for each in ([given] if isinstance(given, str) else given)
+    )
 
 
 def _json_bytes(tree: dict[str, Any]) -> bytes:

@@ -90,6 +90,9 @@ def _parser() -> argparse.ArgumentParser:
     one = add("demonstrations", _demonstrations, "a point's demonstrations, as recorded files")
     one.add_argument("point", metavar="POINT")
     one.add_argument("--out", type=Path, metavar="FOLDER", required=True, help="new or empty")
+    one = add("page", _page, "a point's answer as a web page, with a map to click")
+    one.add_argument("point", metavar="POINT")
+    one.add_argument("--out", type=Path, metavar="FILE", help="default: page-POINT.html here")
     one = add("clean", _clean, "list what no study uses: points, stored stages, dead files")
     one.add_argument("--yes", action="store_true", help="remove it")
     return parser
@@ -163,6 +166,16 @@ def _demonstrations(archive: Archive, options: argparse.Namespace) -> Iterator[s
     files = write_recordings(_point(archive, options.point), options.out)
     yield f"written: {len(files)} demonstrations into {options.out}"
     yield f"rank by them: python experiments/infer.py demonstrations={options.out}"
+
+
+def _page(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
+    """The page of a point."""
+    from experiments.page.of_point import point_page  # what infers takes a second to import
+
+    facts = _point(archive, options.point)
+    path = options.out or Path(f"page-{facts.point.identity[:12]}.html")
+    replace_file(path.resolve(), point_page(facts).encode())
+    yield f"written: {path}"
 
 
 def _clean(archive: Archive, options: argparse.Namespace) -> Iterator[str]:

@@ -73,6 +73,9 @@ ROOMS = {
     "experiments.sweep": f"{POINT} experiments.console experiments.point experiments.collate",
     "experiments.lookback": f"mlci {TRACKING} experiments.collate experiments.config.paths "
     "experiments.config.suggestions experiments.console",
+    "experiments.page": "mlci experiments.console",
+    "experiments.page.of_point": f"{POINT} experiments.console experiments.point experiments.page "
+    "experiments.lookback",
     "paper_figures": f"mlci.regions {TRACKING} experiments.config.paths",
     # The door: the commands, and what they share.
     "experiments.app": EVERYTHING,

@@ -46,6 +46,7 @@ __all__ = [
     "read_advice_config",
     "read_config",
     "read_recorded_config",
+    "settings_of_record",
 ]
 
 _Part = TypeVar("_Part", Settings, StudySettings)
@@ -69,6 +70,17 @@ def read_config(tree: Mapping[str, Any]) -> tuple[Settings, StudySettings]:
     _refuse(hypothesis_problems(settings))
     _refuse(safe_set_problems(settings))
     return settings, study
+
+
+def settings_of_record(config: Mapping[str, Any]) -> Settings:
+    """The settings of a point that has run, from the config in its record.
+
+    Raises:
+        ConfigError: listing every problem, as where settings have changed since.
+    """
+    system = config["system"]
+    written = {"_target_": system["target"], **system["arguments"]}
+    return checked(Settings, {**config, "system": written})
 
 
 def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:

@@ -11,6 +11,7 @@ from experiments.point.forecasts import forecast_calibration
 from experiments.point.stages import tabular_model
 from experiments.point.trials import TrialSet, demonstrations
 from experiments.tracking.store import Store
+from mlci.answers import Answer, answer
 from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose
@@ -96,4 +97,16 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         inference=inference,
         diagnosis=diagnose(model),
         calibration=calibration,
+    )
+
+
+def point_answer(settings: Settings, point: PointInference) -> Answer:
+    """How to read what a point's demonstrations say."""
+    return answer(
+        point.model,
+        point.demonstrations,
+        point.inference,
+        hypotheses=point.hypotheses,
+        exact_ends=settings.inference.exact_ends,
+        samples=settings.misfit,
     )

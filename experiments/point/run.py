@@ -9,11 +9,10 @@ import pandas as pd
 
 from experiments.config.settings import Settings
 from experiments.console import answer_lines, diagnosis_lines, entry, measure_lines, trial_lines
-from experiments.point.inference import infer_point
+from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
 from experiments.point.tables import point_tables
 from experiments.tracking.store import Store
-from mlci.answers import answer
 
 
 def run_point(
@@ -31,14 +30,7 @@ def run_point(
     """
     inferred = infer_point(settings, store)
     inference, space, top = inferred.inference, settings.model.space, settings.ranks.top
-    result = answer(
-        inferred.model,
-        inferred.demonstrations,
-        inference,
-        hypotheses=inferred.hypotheses,
-        exact_ends=settings.inference.exact_ends,
-        samples=settings.misfit,
-    )
+    result = point_answer(settings, inferred)
     covered = np.flatnonzero(inference.hypotheses.inside(settings.constraint)).tolist()
     for line in answer_lines(result, top, covered):
         log(line)

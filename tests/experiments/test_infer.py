@@ -97,6 +97,9 @@ def test_recorded_demonstrations_are_ranked_and_saved(
     best = hypotheses.sort_values(["rank", "hypothesis"]).iloc[0]
     assert f"{best['gain']:.3f}" in done.stdout
     assert (folder / "map.png").stat().st_size > 10_000
+    page = (folder / "page.html").read_text()
+    assert f"Region {best['hypothesis']:.0f} is the most likely to be avoided" in page
+    assert f"page: {folder / 'page.html'}" in done.stdout
     record = json.loads((folder / "record.json").read_text())
     assert record["config"]["dt"] == 0.5
     assert record["not_used"] == []

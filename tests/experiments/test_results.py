@@ -427,6 +427,32 @@ def test_infer_on_a_points_recorded_files_gives_its_ranking_back(
     assert ranking["gain"].max() > 0.1
 
 
+def test_a_point_s_page_has_its_ranking_and_its_truth(
+    settings: Settings, tmp_path: Path, look
+) -> None:
+    point, out = finished(settings, tmp_path), tmp_path / "point.html"
+    status, words, err = look("page", point.identity[:8], "--out", str(out))
+    assert (status, err) == (0, "")
+    assert f"written: {out}" in words
+    text = out.read_text()
+    data = json.loads(re.search(r'id="data">(.*?)</script>', text)[1])
+    table = pd.read_csv(point.folder / "hypotheses.csv")
+    assert data["rank"][-1] == table["rank"].tolist()
+    chances = np.where(np.array(data["chance"][-1]) < 0, 0, data["chance"][-1])
+    np.testing.assert_allclose(chances / 1000, table["posterior"], atol=5.1e-4)
+    assert "Forbidden in truth: position" in text
+    assert 'class="truth"' in text
+    outdate(point)
+    status, _, err = look("page", point.identity, "--out", str(out))
+    assert status == 2
+    assert "the source has changed since it ran; run it again first" in err
+    missing = planned(dataclasses.replace(settings, dt=0.1), tmp_path)
+    missing.folder.mkdir()
+    status, _, err = look("page", missing.identity)
+    assert status == 2
+    assert "has not finished; run it first" in err
+
+
 def test_demonstrations_that_are_not_there_are_told(
     settings: Settings, tmp_path: Path, look
 ) -> None:
