@@ -8,10 +8,12 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from mlci.evidence import rank_scores
 from mlci.regions import Regions
 from mlci.spaces import Box, Floats, Ints, middle_and_half
 
 _ROUNDING = 1e-12  # of a probability: sums may be this much short of a share
+_DECIMALS = 9  # of the probability of an area: those that differ beyond are equal
 _SLACK = 1e-9  # of the bounds: sides closer than this are the same side, as in `Regions`
 
 
@@ -72,7 +74,9 @@ def credible_set(
     if not 0 < share <= 1:
         raise ValueError(f"the share of a credible set must lie in (0, 1], not {share}")
     probability = np.append(posterior_none, posterior)  # "no constraint" wins ties
-    order = np.argsort(-probability, kind="stable")
+    with np.errstate(divide="ignore"):
+        rank = rank_scores(np.log(probability), probability > 0)
+    order = np.argsort(rank, kind="stable")
     held = np.cumsum(probability[order])
     count = min(int(np.searchsorted(held, share - _ROUNDING)) + 1, len(order))
     regions = order[:count][order[:count] > 0] - 1
@@ -85,7 +89,7 @@ def credible_set(
         regions=regions,
         has_none=bool(np.any(order[:count] == 0)),
         probability=float(held[count - 1]),
-        areas=tuple(sorted(areas, key=lambda area: -area.probability)),
+        areas=tuple(sorted(areas, key=lambda area: -round(area.probability, _DECIMALS))),
     )
 
 

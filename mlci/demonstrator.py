@@ -24,6 +24,7 @@ from mlci.spaces import Bools, Box, Floats
 from mlci.systems import System
 
 _DRAWS = 10_000  # attempts to find a safe state before the start box counts as unsafe
+_TIE = 1e-9  # share of a cost: those that differ by less are equal
 _POINTS_BETWEEN = 10  # points between two samples at which the truth is looked for
 
 
@@ -275,11 +276,17 @@ def _best_of(
     misses: Floats,
     dt: float,
 ) -> list[Attempt]:
-    """The best restart of each task, by failures (3, B), in the order of outcomes, and costs."""
-    first = np.arange(len(tasks)) * restarts
-    order = np.lexsort([solution.cost, failures.any(axis=0), np.repeat(first, restarts)])
+    """The best restart of each task, by failures (3, B), in the order of outcomes, and costs.
+
+    Of restarts with equal costs, but for rounding, the first.
+    """
+    failed, costs = (v.reshape(-1, restarts) for v in (failures.any(axis=0), solution.cost))
+    among = (failed == np.min(failed, axis=1, keepdims=True)) & ~np.isnan(costs)
+    costs = np.where(among, costs, np.inf)
+    lowest = np.min(costs, axis=1, keepdims=True)
+    chosen = np.argmax(costs <= lowest + _TIE * np.abs(lowest), axis=1)
     attempts = []
-    for number, best in enumerate(order[first].tolist()):
+    for number, best in enumerate((np.arange(len(tasks)) * restarts + chosen).tolist()):
         outcome = list(Outcome)[int(np.argmax([*failures[:, best], True]))]
         path, controls = solution.states[best], solution.controls[best]
         demonstration = Demonstration(tasks[number], path, controls, dt, f"trial_{number:03d}")

@@ -59,6 +59,8 @@ DEFAULT_MODEL_ERROR = 0.1  # where no forecasts have been scored; the ratio itse
 # times that, so that a pair whose probability only shifts with its ends is not one they decide.
 _NEARLY_0, _NOT_0 = 1e-3, 1e-2
 
+TIE = 1e-9  # nat: gains closer than this are equal, whatever order or machine summed them
+
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
@@ -135,14 +137,21 @@ def total_gain(evidence: Floats) -> Floats:
 
 
 def rank_scores(gain: ArrayLike, feasible: ArrayLike) -> Floats:
-    """Ranks (..., C), 1 for the largest gain; ties share their mean rank, infeasible ones last."""
+    """Ranks (..., C), 1 for the largest gain; ties share their mean rank, infeasible ones last.
+
+    Gains tie if no neighbours between them, by size, are `TIE` apart.
+    """
     loss = -np.where(feasible, gain, -np.inf)
+    order, place = np.argsort(loss, axis=-1), np.arange(loss.shape[-1])
+    ordered = np.take_along_axis(loss, order, axis=-1)
+    with np.errstate(invalid="ignore"):  # infinite ones tie
+        begins = np.diff(ordered, axis=-1, prepend=-np.inf) > TIE
+        ends = np.diff(ordered, axis=-1, append=np.inf) > TIE
+    first = np.maximum.accumulate(np.where(begins, place, 0), axis=-1)
+    last = np.where(ends, place, loss.shape[-1] - 1)[..., ::-1]
+    last = np.minimum.accumulate(last, axis=-1)[..., ::-1]
     rank = np.empty(loss.shape)
-    for row in np.ndindex(loss.shape[:-1]):
-        ordered = np.sort(loss[row])
-        better = np.searchsorted(ordered, loss[row], side="left")
-        up_to_ties = np.searchsorted(ordered, loss[row], side="right")
-        rank[row] = (better + 1 + up_to_ties) / 2
+    np.put_along_axis(rank, order, (first + last) / 2 + 1, axis=-1)
     return rank
 
 
@@ -266,10 +275,12 @@ def printed_confidence(prior: float, avoidance: ArrayLike) -> float:
         avoidance: (N,) alpha = 1 - Phi, its probability of being avoided in each demonstration.
 
     Returns:
-        What the formula gives; infinite where it divides by 0.
+        What the formula gives; infinite where it divides by 0, but for rounding.
     """
     if not 0 <= prior <= 1:
         raise ValueError(f"a prior probability lies in [0, 1], not {prior}")
     coincidence = float(np.prod(np.asarray(avoidance, dtype=float)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.float64(prior) / (prior - (1 - prior) * coincidence))
+    divisor = prior - (1 - prior) * coincidence
+    if abs(divisor) <= TIE * prior:
+        return np.inf if prior else np.nan
+    return prior / divisor

@@ -18,6 +18,7 @@ from mlci.spaces import Bools, Floats, Ints
 # Forecasts are counted between these probabilities of crossing.
 EDGES = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 BIN_COLUMNS = ("lower", "upper", "count", "forecast", "crossed", "low", "high")
+_DECIMALS = 9  # of a forecast that is put into a bin: what differs beyond is rounding
 _RESAMPLES, _TAILS = 1000, (0.025, 0.975)  # of a 95 % interval
 
 
@@ -73,7 +74,8 @@ def score_forecasts(
     with np.errstate(divide="ignore"):
         log_scores = np.log(np.where(crossed, 1 - alpha, alpha))
     brier = (1 - alpha - crossed) ** 2
-    place = np.clip(np.searchsorted(EDGES, 1 - alpha, side="right"), 1, len(EDGES) - 1)
+    forecast = np.round(1 - alpha, _DECIMALS)
+    place = np.clip(np.searchsorted(EDGES, forecast, side="right"), 1, len(EDGES) - 1)
     rows = []
     for number in np.unique(place[use]):
         inside = use & (place == number)

@@ -97,9 +97,9 @@ def top_chances(gains: Floats, good: Bools, top: int) -> Floats:
         (B,) 1 or 0; between them where the last places are tied: the chance that all are good if
         the tie is broken at random.
     """
-    loss = -gains
-    last = np.sort(loss, axis=1)[:, [top - 1]]
-    before, tied = loss < last, loss == last
+    rank = rank_scores(gains, gains > -np.inf)
+    last = np.sort(rank, axis=1)[:, [top - 1]]
+    before, tied = rank < last, rank == last
     places = top - np.sum(before, axis=1)
     fitting, all_ways = (comb(np.sum(part, axis=1), places) for part in (tied & good, tied))
     return np.asarray(np.all(good | ~before, axis=1) * fitting / all_ways)

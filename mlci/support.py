@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlci.evidence import total_gain
+from mlci.evidence import TIE, total_gain
 from mlci.inference import Inference
 from mlci.spaces import Bools, Floats, Ints
 
-_TIE = 1e-9  # nat: gains closer than this are equal, whatever order they were summed in
+_DECIMALS = 9  # of a share: what differs beyond is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Support:
 
     def carriers(self, part: float = 0.5) -> Ints:
         """The fewest demonstrations that bring this part of the gain, the largest share first."""
-        order = np.argsort(-self.share, kind="stable")
+        order = np.argsort(-np.round(self.share, _DECIMALS), kind="stable")
         held = np.cumsum(self.share[order])
         if not len(held) or held[-1] == 0:
             return order[:0]
@@ -68,6 +68,5 @@ def support(inference: Inference) -> Support:
 
 def _first(gain: Floats, preferred: int) -> int:
     """The region with the most gain, or the preferred one if it ties."""
-    best = int(np.argmax(gain))
-    ties = gain[preferred] == gain[best] or gain[preferred] >= gain[best] - _TIE
-    return preferred if ties else best
+    ties = gain >= np.max(gain) - TIE
+    return preferred if ties[preferred] else int(np.argmax(ties))

@@ -50,7 +50,7 @@ MLCI = {
     "mlci.calibration": "mlci.forecast_scores mlci.demonstrator mlci.preparation",
     "mlci.inverse_dynamics": "mlci.demonstrations mlci.simulate",
     "mlci.temperature": "mlci.inference mlci.inverse_dynamics mlci.maxent",
-    "mlci.credible_sets": "mlci.regions",
+    "mlci.credible_sets": "mlci.evidence mlci.regions",
     "mlci.support": "mlci.inference",
     "mlci.misfit": "mlci.maxent",
     "mlci.answers": "mlci.misfit mlci.support mlci.temperature",

@@ -10,6 +10,7 @@ from experiments.collate.intervals import TAILS, Floats, generator
 from experiments.collate.reliability import EDGES, NO_TRUTH, set_resamples, weighted
 
 PAPER, FIXED = "paper", "model error"  # the paper's evidence; how kinds with a fixed rate begin
+_DECIMALS = 9  # of a probability that is put into a bin: what differs beyond is rounding
 LEAST = 1e-10  # a posterior below counts as this, where its logarithm is averaged
 CHANCES = 1000  # draws of what would be right if posteriors came true
 
@@ -100,7 +101,8 @@ def _off_by_chance(rows: pd.DataFrame, key: list[str]) -> Floats:
 
 def _distance(weights: Floats, best: Floats, excess: Floats) -> Floats:
     """(B,) how far weighed excesses (S,) or (B, S) are from 0, over bins of the posterior."""
-    place = np.clip(np.searchsorted(EDGES, best, side="right"), 1, len(EDGES) - 1)
+    place = np.searchsorted(EDGES, np.round(best, _DECIMALS), side="right")
+    place = np.clip(place, 1, len(EDGES) - 1)
     weighed = weights * excess
     return sum(
         (np.abs(weighed[..., place == number].sum(axis=-1)) for number in np.unique(place)),

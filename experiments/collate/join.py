@@ -24,6 +24,7 @@ from experiments.collate.reliability import reliability
 from experiments.tracking.files import csv_bytes, digest, replacing
 from experiments.tracking.points import Point
 from experiments.tracking.study import Study, collated, whole_study, write_collated
+from experiments.tracking.tables import rounded
 
 
 def collate(
@@ -61,7 +62,7 @@ def collate(
             parts = joined_parts(name, finished)
             joined[name], digests[f"{name}.csv"] = _write(folder, name, parts, files)
         for name, frame in _made_tables(finished, joined, study, log).items():
-            _, digests[f"{name}.csv"] = _write(folder, name, [csv_bytes(frame)], files)
+            _, digests[f"{name}.csv"] = _write(folder, name, [csv_bytes(rounded(frame))], files)
     _remove_former(study, digests, folder)
     records = {point.identity: point.record for point in finished}
     write_collated(folder, collated(records, digests))

@@ -29,6 +29,7 @@ from mlci.tabular import TabularModel
 
 # Probabilities are counted between these; most hypotheses are unlikely, so the first are narrow.
 EDGES = (0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
+_DECIMALS = 9  # of a probability that is put into a bin: what differs beyond is rounding
 _DRAWS = 1000  # of a task until one can be solved
 
 
@@ -94,8 +95,9 @@ def _beliefs(inference: Inference, truth: Bools) -> Iterator[tuple[str, Floats, 
 
 def _binned(probability: Floats, right: Bools) -> Iterator[dict[str, float]]:
     """Counts of each bin that holds something; 0 is below 0, and one more than the last above 1."""
-    place = np.searchsorted(EDGES, probability, side="right")
-    place = np.where(probability == EDGES[-1], len(EDGES) - 1, place)
+    rounded = np.round(probability, _DECIMALS)
+    place = np.searchsorted(EDGES, rounded, side="right")
+    place = np.where(rounded == EDGES[-1], len(EDGES) - 1, place)
     for number in np.unique(place):
         inside = place == number
         yield {

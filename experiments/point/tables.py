@@ -20,6 +20,7 @@ from experiments.point.trajectory_tables import (
 )
 from experiments.point.truth_tables import TRUTH_TABLES, truth_tables
 from experiments.tracking.files import csv_bytes
+from experiments.tracking.tables import rounded
 from mlci.inference import Inference
 from mlci.misfit import Misfit
 from mlci.spaces import Floats
@@ -88,9 +89,9 @@ def opening_columns(name: str, settings: Settings) -> dict[str, str | int | floa
 
 
 def table_bytes(name: str, frame: pd.DataFrame, settings: Settings) -> bytes:
-    """A point's table as CSV, every row opened by the point's own values, floats exact."""
+    """A point's table as CSV, every row opened by the point's own values, which stay exact."""
     opening = opening_columns(name, settings)
-    rows = frame.drop(columns=[column for column in frame.columns if column in opening])
+    rows = rounded(frame.drop(columns=[column for column in frame.columns if column in opening]))
     for place, (column, value) in enumerate(opening.items()):
         rows.insert(place, column, value)
     return csv_bytes(rows)

@@ -10,6 +10,8 @@ import pandas as pd
 from mlci.spaces import Bools, Floats, Ints
 from mlci.tabular import TabularModel
 
+_TIE = 1e-9  # sums of probabilities closer than this are equal
+
 
 def trial_that_shows_the_constraint(feasible: Bools, unconstrained: Floats, covered: Bools) -> int:
     """The feasible trial that is most likely to violate the truth where nobody forbids it.
@@ -21,7 +23,8 @@ def trial_that_shows_the_constraint(feasible: Bools, unconstrained: Floats, cove
         unconstrained: (N, C) violation probabilities without constraint.
         covered: (C,) which hypotheses lie inside the truth.
     """
-    return int(np.argmax(np.where(feasible, np.sum(unconstrained[:, covered], axis=1), -1.0)))
+    chance = np.where(feasible, np.sum(unconstrained[:, covered], axis=1), -1.0)
+    return int(np.argmax(chance >= np.max(chance) - _TIE))
 
 
 def trajectory_tables(

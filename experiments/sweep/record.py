@@ -17,6 +17,7 @@ from experiments.tracking.environment import environment, peak_memory
 from experiments.tracking.files import digest, replace_file
 from experiments.tracking.points import Point
 from experiments.tracking.store import Store
+from experiments.tracking.tables import rounded
 from experiments.tracking.trees import plain
 
 
@@ -41,7 +42,7 @@ def write_result(
         data = table_bytes(name, frame, settings)
         files[f"{name}.csv"] = digest(data)
         replace_file(point.folder / f"{name}.csv", data)
-    row = tables["summary"].to_dict("records")[0] if "summary" in tables else {}
+    row = rounded(tables["summary"]).to_dict("records")[0] if "summary" in tables else {}
     record = {
         "identity": point.identity,
         "source": point.source,

@@ -129,3 +129,14 @@ def test_no_constraint_wins_ties_and_may_be_all() -> None:
 def test_a_share_out_of_range_is_refused(share: float) -> None:
     with pytest.raises(ValueError, match=r"share of a credible set must lie in \(0, 1\]"):
         credible_set(CELLS, np.full(24, 1 / 24), 0.0, share)
+
+
+def test_probabilities_that_differ_by_rounding_are_taken_in_order() -> None:
+    four = Regions.from_grid(SPACE, (1, 4))
+    for last in (0.3, 0.3 + 1e-16, 0.3 - 1e-16):
+        result = credible_set(four, np.array([0.3, 0.1, 0.3, last]), 0.0, 0.55)
+        assert result.regions.tolist() == [0, 2]
+    apart = Regions.from_grid(SPACE, (6, 1)).select(np.array([1, 0, 1, 0, 0, 0], dtype=bool))
+    for last in (0.5, 0.5 + 2e-16, 0.5 - 2e-16):
+        areas = credible_set(apart, np.array([0.5, last]), 0.0, 1.0).areas
+        assert [area.regions.tolist() for area in areas] == [[0], [1]]

@@ -4,9 +4,17 @@ import numpy as np
 import pytest
 
 from mlci.demonstrations import Demonstration, Task
-from mlci.demonstrator import Outcome, Trial, crossing, demonstrate, enters, sample_trials
+from mlci.demonstrator import (
+    Outcome,
+    Trial,
+    _best_of,
+    crossing,
+    demonstrate,
+    enters,
+    sample_trials,
+)
 from mlci.grids import Grid
-from mlci.ilqr import optimize
+from mlci.ilqr import Solution, optimize
 from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
@@ -290,3 +298,15 @@ def test_demonstration_checks_itself(changes, message):
     task = Task(np.zeros(2), Box.point([1.0, 0.0]), 1.0)
     with pytest.raises(ValueError, match=message):
         Demonstration(task, given["states"], given["controls"], given["dt"], "lift")
+
+
+def test_of_equal_restarts_the_first_is_taken_whatever_the_rounding():
+    path = np.full((4, 3, 2), [0.5, 0.0])
+    for lowest in ([0.5, 0.5 + 1e-15], [0.5 + 1e-15, 0.5]):
+        cost = np.array([*lowest, 0.4, 0.3])
+        solution = Solution(path, np.zeros((4, 2, 1)), np.zeros((4, 2)), cost[None])
+        failures = np.zeros((3, 4), bool)
+        failures[2, 3] = True  # the cheapest of the second task misses its goal
+        tasks = [trial([0.5, 0.0], [3.0, 0.0], 0.0).task] * 2
+        attempts = _best_of(2, tasks, solution, failures, np.zeros(4), 2.5)
+        assert [attempt.restart for attempt in attempts] == [0, 0]

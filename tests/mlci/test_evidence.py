@@ -121,6 +121,10 @@ def test_printed_confidence_is_what_the_paper_prints() -> None:
     assert printed_confidence(0.5, [0.8] * 9) == pytest.approx(1.155, abs=5e-4)
     assert printed_confidence(0.9, [0.5]) == pytest.approx(0.9 / (0.9 - 0.1 * 0.5))
     assert printed_confidence(0.5, []) == np.inf
+    assert printed_confidence(0.5, [1 - 1e-16]) == printed_confidence(0.5, [1 - 1e-12]) == np.inf
+    assert printed_confidence(0.5, [1 - 1e-6]) == pytest.approx(1e6)
+    assert np.isnan(printed_confidence(0.0, [0.0]))
+    assert printed_confidence(0.0, [0.5]) == 0
     assert printed_confidence(0.2, [0.9]) == pytest.approx(0.2 / (0.2 - 0.8 * 0.9))
     assert printed_confidence(0.2, [0.9]) < 0
     with pytest.raises(ValueError, match=r"\[0, 1\], not 1.5"):
@@ -197,3 +201,20 @@ def test_a_cell_decides_what_is_certain_only_between_cells() -> None:
     between_states = [[0.3, 0.02, 1.0, 0.9, 1e-20, 0.9, 0.0, 1.0]]
     expected = [[True, True, True, True, False, False, False, False]]
     assert decided_by_cell(between_cells, between_states).tolist() == expected
+
+
+def test_gains_that_differ_by_rounding_tie() -> None:
+    """The same evidence summed in two orders, and what differs by more."""
+    parts = np.array([0.1, 0.7, 0.3, 1e-3])
+    one, other = sum(parts), sum(parts[::-1])
+    assert 0 < abs(one - other) < 1e-14
+    gain = np.array([one, other, one + 1e-8, -np.inf, np.inf, one, np.inf])
+    for order in (np.arange(7), np.arange(7)[::-1]):
+        rank = rank_scores(gain[order], np.ones(7, bool))
+        assert rank.tolist() == np.array([5, 5, 3, 7, 1.5, 5, 1.5])[order].tolist()
+    both = np.stack([gain, np.zeros(7)])
+    feasible = np.arange(7) != 5
+    ranks = rank_scores(both, feasible)
+    assert ranks[0].tolist() == [4.5, 4.5, 3, 6.5, 1.5, 6.5, 1.5]
+    assert ranks[1].tolist() == [3.5] * 5 + [7, 3.5]
+    assert rank_scores(np.zeros((2, 0)), np.zeros((2, 0), bool)).shape == (2, 0)

@@ -53,3 +53,9 @@ def test_the_impossible_scores_minus_infinity() -> None:
 def test_nothing_to_score_is_said() -> None:
     with pytest.raises(ValueError, match="nothing to score"):
         score_forecasts(ALPHA, CROSSED, np.zeros((2, 3), dtype=bool))
+
+
+def test_a_forecast_that_is_an_edge_but_for_rounding_stands_above_it() -> None:
+    alpha = np.array([[0.9], [np.nextafter(0.9, 0)], [np.nextafter(0.9, 1)]])
+    scores = score_forecasts(alpha, np.zeros((3, 1)), np.ones((3, 1)))
+    assert scores.bins[["lower", "count"]].to_numpy().tolist() == [[0.1, 3.0]]

@@ -135,3 +135,11 @@ def test_claim_is_the_posterior_of_the_best() -> None:
     many[:5, :2] = np.inf
     expected = [np.max(posterior(gain, 0.3)[0]) for gain in many]
     np.testing.assert_allclose(claims(many, 0.3), expected, rtol=1e-13)
+
+
+def test_gains_that_differ_by_rounding_share_the_top() -> None:
+    gains = np.array([[1.0, 1.0 + 4e-16, 1.0 - 2e-16, 0.0]])
+    good = np.array([True, False, False, False])
+    assert len(set(gains[0])) == 4
+    assert top_chances(gains, good, 1).tolist() == pytest.approx([1 / 3])
+    assert truth_ranks(gains, good).tolist() == [2.0]

@@ -87,3 +87,14 @@ def test_nothing_carries_what_has_no_gain() -> None:
                 np.ones(1, bool),
             )
         )  # fmt: skip
+
+
+def test_rounding_decides_neither_who_carries_nor_who_is_next() -> None:
+    """Two demonstrations that bring the same, and two regions that tie without the first."""
+    near = np.nextafter(0.5, [0, 0.5, 1])
+    assert len({support(inference([[a], [0.5]], np.zeros((2, 1)))).share[0] for a in near}) > 1
+    for a in near:
+        assert support(inference([[a], [0.5]], np.zeros((2, 1)))).carriers(0.8).tolist() == [0, 1]
+        assert support(inference([[a], [0.5]], np.zeros((2, 1)))).carriers(0.4).tolist() == [0]
+        each = inference([[1e-9, 1.0, 1.0], [1.0, 0.5, a]], np.zeros((2, 3)))
+        assert support(each).first_without.tolist() == [1, 0]

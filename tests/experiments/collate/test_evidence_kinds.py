@@ -107,3 +107,14 @@ def test_what_chance_leaves_is_over_all_outcomes_by_their_probability() -> None:
     # Between the quantiles that 1000 draws can take for the 95 % one.
     low, high = (np.array(off)[order][np.searchsorted(below, share)] for share in (0.92, 0.98))
     assert low <= row["by_chance_high"] <= high
+
+
+def test_a_posterior_that_is_an_edge_but_for_rounding_stays_in_its_bin() -> None:
+    """0.1 is where two bins meet, and 0.15 is in the upper one."""
+    rows = table(paper=1.0)
+    off = set()
+    for best in (0.1, np.nextafter(0.1, 0), np.nextafter(0.1, 1)):
+        rows.loc[rows["best"] == 0.12, "best"] = best
+        off.update(evidence_kinds(rows)["off_by"].round(12))
+        rows.loc[rows["best"] == best, "best"] = 0.12
+    assert len(off) == 1

@@ -13,7 +13,7 @@ from tiny_point import composed
 from experiments.collate.reliability import reliability
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
-from experiments.point.belief_counts import EDGES, belief_counts
+from experiments.point.belief_counts import EDGES, _binned, belief_counts
 from experiments.point.inference import PointInference
 from experiments.point.run import run_point
 from experiments.point.stages import tabular_model
@@ -207,3 +207,19 @@ def test_model_that_solves_no_task_is_refused(tmp_path: Path) -> None:
     settings = tiny("truth=none", "calibration.sets=1", *stuck)
     with pytest.raises(RuntimeError, match="none of 1000 tasks can be solved by the tabular agent"):
         counts(settings, Store(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("probability", "place"),
+    [(0.005, 2), (1.0, BEYOND - 1), (0.0, 1), (0.9, BEYOND - 1), (0.1, 6), (np.inf, BEYOND)],
+)
+def test_a_probability_that_is_an_edge_but_for_rounding_stays_in_its_bin(
+    probability: float, place: int
+) -> None:
+    """The prior of one of 100 hypotheses is an edge, and so is a posterior that is printed as 1."""
+    near = [probability, np.nextafter(probability, -1), np.nextafter(probability, 2)]
+    near = np.array(near if np.isfinite(probability) else [probability] * 3)
+    (row,) = _binned(near, np.zeros(3, bool))
+    assert (row["bin"], row["count"]) == (place, 3)
+    assert next(_binned(np.array([1 + 1e-6]), np.zeros(1, bool)))["bin"] == BEYOND
+    assert next(_binned(np.array([-1e-6]), np.zeros(1, bool)))["bin"] == 0

@@ -68,3 +68,8 @@ def test_telling_trial_would_violate_the_truth_most() -> None:
     # A truth that covers no hypothesis tells nothing: the first that is feasible.
     none = np.array([False, False])
     assert trial_that_shows_the_constraint(np.array([False, True, True, True]), phi, none) == 1
+
+
+def test_rounding_does_not_choose_the_trial_that_shows_the_constraint() -> None:
+    chance = np.array([[0.2], [0.7 - 1e-16], [0.7], [0.7 + 1e-16]])
+    assert trial_that_shows_the_constraint(np.ones(4, bool), chance, np.ones(1, bool)) == 1
