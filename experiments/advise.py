@@ -19,7 +19,8 @@ from tqdm import tqdm
 from experiments.app import DONE, FAILED, run_command
 from experiments.config.read import ConfigError, read_advice_config
 from experiments.config.settings import AdviceSettings
-from experiments.console import noise_words, table_lines, words
+from experiments.console import noise_words
+from experiments.terminal import table_lines, words
 from mlci.demonstrations import Task
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.diagnosis import MOST_UNREACHABLE, Diagnosis, diagnose

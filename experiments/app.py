@@ -1,16 +1,19 @@
 """How a command starts and ends: signals, the config from the command line, exit codes.
 
-What a command does is imported late, so that Ctrl-C ends it quietly from the start.
+What a command does is imported late, so that Ctrl-C ends it quietly from the start, and so that
+--help and --version need not wait for it.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 import traceback
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 # Exit codes of all commands: all is done, something failed, the config is wrong, Ctrl-C.
@@ -19,17 +22,17 @@ DONE, FAILED, REFUSED, STOPPED = 0, 1, 2, 130
 
 def run() -> int:
     """`mlci-run`: experiments/run.py."""
-    return _start("experiments.run")
+    return _start("experiments.run", help_file="config.txt")
 
 
 def infer() -> int:
     """`mlci-infer`: experiments/infer.py."""
-    return _start("experiments.infer")
+    return _start("experiments.infer", help_file="infer.txt")
 
 
 def advise() -> int:
     """`mlci-advise`: experiments/advise.py."""
-    return _start("experiments.advise")
+    return _start("experiments.advise", help_file="advise.txt")
 
 
 def results() -> int:
@@ -109,11 +112,21 @@ def run_command(
     return DONE
 
 
-def _start(module: str) -> int:
+def _start(module: str, help_file: str | None = None) -> int:
     """Import a module, which takes a second, and run its `main`; returns the exit status.
 
     Modules of the current folder can be imported by name, such as those of a user's own system.
+
+    Args:
+        module: of the command.
+        help_file: in conf/help, what it says to --help; None if `main` answers that.
     """
+    if "--version" in sys.argv[1:]:
+        print(_version())
+        return DONE
+    if help_file is not None and {"--help", "-h"}.intersection(sys.argv[1:]):
+        print(_help(help_file), end="")
+        return DONE
     # After all others, so that it hides none of them; workers get the same. Python itself adds the
     # folder of the file that it was given, where a module of ours could be taken for a user's.
     ours = os.path.dirname(os.path.abspath(__file__))
@@ -130,6 +143,23 @@ def _start(module: str) -> int:
     if usual is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _leave)  # while the interpreter ends
     return status
+
+
+def _version() -> str:
+    """Version of mlci, and the checkout's commit; mlci is not imported, as that loads scipy."""
+    from experiments.tracking.environment import commit_words
+
+    source = Path(__file__).parents[1] / "mlci" / "__init__.py"
+    (number,) = re.findall('^__version__ = "(.+)"$', source.read_text(encoding="utf-8"), re.M)
+    return f"mlci {number}{commit_words()}"
+
+
+def _help(name: str) -> str:
+    """A text of conf/help, with the names that the commands have here."""
+    from experiments.config.paths import CHECKOUT, CONF
+
+    text = (CONF / "help" / name).read_text(encoding="utf-8")
+    return text if CHECKOUT else re.sub(r"python experiments/(\w+)\.py", r"mlci-\1", text)
 
 
 def _leave(*_: Any) -> None:

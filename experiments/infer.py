@@ -22,11 +22,12 @@ from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, read_recorded_config
 from experiments.config.settings import ESTIMATE, RecordedSettings
-from experiments.console import answer_lines, diagnosis_lines, entry
+from experiments.console import answer_lines, diagnosis_lines
 from experiments.page.document import page
 from experiments.point.forecasts import recorded_calibration
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.truth_tables import dimension_table
+from experiments.terminal import entry
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.store import Store

@@ -16,13 +16,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from experiments.config.paths import default_results
+from experiments.config.paths import CHECKOUT, default_results
 from experiments.lookback.archive import Archive, ArchiveError, Facts
 from experiments.lookback.cleaning import clean
-from experiments.lookback.export import file_bytes, tidy_table
 from experiments.lookback.freshness import point_concerns
 from experiments.lookback.query import select
-from experiments.lookback.recordings import write_recordings
 from experiments.lookback.views import (
     differences,
     point_facts,
@@ -35,6 +33,32 @@ from experiments.lookback.views import (
 from experiments.tracking.files import replace_file
 from experiments.tracking.points import State
 from experiments.tracking.study import Study
+
+_PURPOSE = """\
+Look back at what was computed: list, compare, export and clean points and
+studies. The beginning of a point's identity is enough to name it."""
+# Three calls of each subcommand.
+_EXAMPLES = {
+    "status": ("", "paper", "paper --results results/smoke"),
+    "list": ("", "paper", "points --state failed --state stale"),
+    "show": ("paper", "000e5c", "000e5c --results results/smoke"),
+    "diff": ("000e5c 040cfa", "000e5 040c", "000e5c 040cfa --results results/smoke"),
+    "page": ("000e5c", "000e5c --out page.html", "000e5c --results results/smoke"),
+    "query": ("truth=c1 'dt<=0.5'", "cells=400 --study paper", "'final_state_error>1'"),
+    "export": ("paper", "paper --out paper.csv", "paper --table ranks"),
+    "demonstrations": (
+        "000e5c --out recorded",
+        "000e5c --out ~/recorded",
+        "000e5c --out /tmp/recorded",
+    ),
+    "clean": ("", "--yes", "--results results/smoke"),
+}
+
+
+def _examples(*calls: str) -> str:
+    """Calls of this command, as one types them."""
+    name = "mlci-results" if CHECKOUT is None else "python experiments/results.py"
+    return "\n".join(["examples:", *(f"  {name} {call}".rstrip() for call in calls)])
 
 
 def main() -> int:
@@ -59,13 +83,25 @@ def main() -> int:
 
 def _parser() -> argparse.ArgumentParser:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=_PURPOSE,
+        epilog=_examples("status", "list paper", "query truth=c1 'dt<=0.5'"),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="store_true", help="the version of mlci")
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument("--results", type=Path, help="folder of results", metavar="DIR")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def add(name: str, command: Any, text: str) -> argparse.ArgumentParser:
-        subparser = commands.add_parser(name, help=text, description=text, parents=[common])
+        subparser = commands.add_parser(
+            name,
+            help=text,
+            description=f"{text[0].upper()}{text[1:]}.",
+            epilog=_examples(*(f"{name} {words}" for words in _EXAMPLES[name])),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            parents=[common],
+        )
         subparser.set_defaults(command=command)
         return subparser
 
@@ -144,6 +180,8 @@ def _query(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
 
 def _export(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """One table of a study."""
+    from experiments.lookback.export import file_bytes, tidy_table  # pandas
+
     if options.format == "parquet" and options.out is None:
         raise ArchiveError("--format parquet needs --out FILE: it is no text for a terminal")
     points = archive.points_of(archive.study(options.study))
@@ -163,6 +201,8 @@ def _export(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
 
 def _demonstrations(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """Recorded files of a point's demonstrations."""
+    from experiments.lookback.recordings import write_recordings  # mlci
+
     files = write_recordings(_point(archive, options.point), options.out)
     yield f"written: {len(files)} demonstrations into {options.out}"
     yield f"rank by them: python experiments/infer.py demonstrations={options.out}"

@@ -28,8 +28,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # loads scipy.optimize when it is first used: most commands never do
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize
 from scipy.special import expit
 
 from mlci.regions import Regions
@@ -202,7 +202,7 @@ def _fit_curve(
     bounds = [(None, None), (0, None), (0, None), (min(_LOWEST_CEILING, highest), highest)]
     # From below the highest ceiling, and from a lower one: the loss has a valley on either side.
     solutions = [
-        minimize(
+        scipy.optimize.minimize(
             loss,
             [0.0, 1.0, 1.0, ceiling * highest],
             jac=True,

@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
-from scipy.stats import chi2
+import scipy  # loads scipy.optimize when it is first used: most commands never do
+from scipy.special import gammaincinv
 
 from mlci.spaces import Floats
 
 CONFIDENCE = 0.95
-DROP = float(chi2.ppf(CONFIDENCE, 1)) / 2  # of the log likelihood, at the interval's ends [nat]
+# Half the quantile of chi^2: what the log likelihood drops to the interval's ends [nat].
+DROP = float(gammaincinv(1 / 2, CONFIDENCE))
 
 
 def likelihood_interval(
@@ -38,7 +39,7 @@ def likelihood_interval(
     at = int(np.argmax(values))
     best, highest = float(grid[at]), float(values[at])
     near = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
-    peak = minimize_scalar(
+    peak = scipy.optimize.minimize_scalar(
         lambda number: -log_likelihood(number),
         bounds=near,
         method="bounded",
@@ -51,7 +52,11 @@ def likelihood_interval(
     def crossing(outside: int, inside: float) -> float:
         """Where the level is passed between a number of the grid and one that is above it."""
         ends = float(grid[outside]), inside
-        return float(brentq(lambda number: log_likelihood(number) - level, *ends, xtol=tolerance))
+        return float(
+            scipy.optimize.brentq(
+                lambda number: log_likelihood(number) - level, *ends, xtol=tolerance
+            )
+        )
 
     inside = np.append(grid[values >= level], best)  # perhaps no number of the grid
     low, high = float(np.min(inside)), float(np.max(inside))

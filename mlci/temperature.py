@@ -26,7 +26,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy  # loads scipy.interpolate when it is first used: most commands never do
 
 from mlci.demonstrations import Demonstration
 from mlci.evidence import DEFAULT_MODEL_ERROR, Rates, log_evidence, log_marginal, total_gain
@@ -165,7 +165,9 @@ def temperature_of_rewards(
     least, most = paths.bounds
     near = np.flatnonzero(free + most >= np.max(free) + least - DROP)
     nodes = grid[max(near[0] - 1, 0) : near[-1] + 2]
-    between = PchipInterpolator(nodes, [paths.by_constraint(log_t) for log_t in nodes])
+    between = scipy.interpolate.PchipInterpolator(
+        nodes, [paths.by_constraint(log_t) for log_t in nodes]
+    )
 
     def by_constraint(log_t: Floats) -> Floats:
         """What constraints add, between the nodes."""

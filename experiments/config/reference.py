@@ -1,6 +1,7 @@
-"""Write what the settings tell: JSON schemas for editors, and the tables of conf/README.md.
+"""Write what the settings tell: schemas for editors, tables of conf/README.md, texts of --help.
 
-`python -m experiments.config.reference` writes conf/schema/*.json and the tables between the marks.
+`python -m experiments.config.reference` writes conf/schema/*.json, conf/help/*.txt, and the tables
+between the marks.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from omegaconf import OmegaConf
 from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 
+from experiments.config.help_text import Option, help_text
 from experiments.config.paths import CONF
 from experiments.config.settings import AdviceSettings, RecordedSettings, RunSettings
 from experiments.config.settings.kinds import MULTIPLE_OF_PI
@@ -63,7 +65,7 @@ def readme(text: str) -> str:
     """The text of conf/README.md with its tables written anew."""
     common: set[str] = set()
     for command in COMMANDS:
-        lines = list(_rows(command))
+        lines = [_row(option) for option in options(command)]
         shared = [row.split(" | ")[0].removeprefix("| ") for row in lines if row in common]
         new = [row for row in lines if row not in common]
         common.update(lines)
@@ -78,10 +80,10 @@ def readme(text: str) -> str:
 
 
 def main() -> None:
-    """Write the schemas and the tables."""
-    (CONF / "schema").mkdir(exist_ok=True)
+    """Write the schemas, the texts and the tables."""
     for command in COMMANDS:
         replace_file(CONF / "schema" / f"{command}.json", schema_bytes(command))
+        replace_file(CONF / "help" / f"{command}.txt", help_of(command).encode())
     path = CONF / "README.md"
     replace_file(path, readme(path.read_text()).encode())
 
@@ -100,28 +102,45 @@ class _WithMultiplesOfPi(GenerateJsonSchema):
         return {"anyOf": [super().float_schema(schema), words]}
 
 
-def _rows(command: str) -> Iterator[str]:
-    """A row of a table for each value that a command takes."""
+def options(command: str) -> list[Option]:
+    """Every value that a command takes, in the order of its settings."""
     tree, defaults = schema(command), _defaults(command)
 
-    def rows_of(node: dict[str, Any], prefix: str) -> Iterator[str]:
+    def options_of(node: dict[str, Any], prefix: str) -> Iterator[Option]:
         for name, field in node["properties"].items():
             key, content = f"{prefix}{name}", _resolved(field, tree)
             if key in ("defaults", "hydra"):
                 continue
             if name != "system" and "description" not in field and "properties" in content:
-                yield from rows_of(content, f"{key}.")
+                yield from options_of(content, f"{key}.")
                 continue
-            cells = (
-                f"`{key}`",
-                field["description"],
-                field.get("unit", ""),
-                defaults.get(key, ""),
-                _values(field, tree),
+            yield Option(
+                key=key,
+                meaning=field["description"],
+                unit=field.get("unit", ""),
+                default=defaults.get(key, ""),
+                values=_values(field, tree),
             )
-            yield f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
 
-    yield from rows_of(tree, "")
+    return list(options_of(tree, ""))
+
+
+def _row(option: Option) -> str:
+    """An option as a row of a table."""
+    cells = (f"`{option.key}`", option.meaning, option.unit, option.default, option.values)
+    return f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
+
+
+def help_of(command: str) -> str:
+    """What a command says to --help: its own options, then those of the commands before."""
+    before = list(COMMANDS)[: list(COMMANDS).index(command)]
+    shared = {option for other in before for option in options(other)}
+    every = options(command)
+    return help_text(
+        command,
+        own=[option for option in every if option not in shared],
+        shared=[option for option in every if option in shared],
+    )
 
 
 def _values(field: dict[str, Any], tree: dict[str, Any]) -> str:

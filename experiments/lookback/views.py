@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from experiments.console import job_names, table_lines
 from experiments.lookback.archive import Archive, Facts, count_states
 from experiments.lookback.freshness import figure_concerns, table_concerns
 from experiments.lookback.query import varying
+from experiments.terminal import job_names, table_lines
 from experiments.tracking.points import State
 from experiments.tracking.study import Study
 from experiments.tracking.trees import flatten

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.console import bounds, words
+from experiments.console import bounds
+from experiments.terminal import words
 from mlci.answers import Answer, listed
 from mlci.regions import Regions
 from mlci.spaces import Ints, middle_and_half

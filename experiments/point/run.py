@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
-from experiments.console import answer_lines, diagnosis_lines, entry, measure_lines, trial_lines
+from experiments.console import answer_lines, diagnosis_lines, measure_lines, trial_lines
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
 from experiments.point.tables import point_tables
+from experiments.terminal import entry
 from experiments.tracking.store import Store
 
 

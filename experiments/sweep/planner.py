@@ -17,13 +17,13 @@ from experiments.config.explain import explain
 from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, plain_tree
 from experiments.config.settings import StudySettings
-from experiments.console import job_names
 from experiments.sweep.combinations import Combinations
 from experiments.sweep.messages import describe_failures, describe_problems
 from experiments.sweep.plan import Job, PlannedPoint, count_states, read_point, select_points
 from experiments.sweep.pool import PoolLauncher
 from experiments.sweep.runner import run_points
 from experiments.sweep.worker import run_task
+from experiments.terminal import job_names
 from experiments.tracking.points import State
 from experiments.tracking.study import write_plan
 

@@ -59,6 +59,13 @@ def environment(results: Path) -> dict[str, Any]:
     }
 
 
+def commit_words() -> str:
+    """The checkout's commit, and whether files differ from it, in brackets; empty without one."""
+    commit, diff, untracked = _git_state()
+    changed = ", with changes" if diff or untracked else ""
+    return "" if commit is None else f" (commit {commit[:12]}{changed})"
+
+
 def reset_peak_memory() -> None:
     """Measure this process's peak memory from now on, where the system allows it."""
     try:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from experiments.console import answer_lines, bounds, entry, probability
+from experiments.console import answer_lines, bounds, probability
+from experiments.terminal import entry
 from mlci.answers import Answer
 from mlci.evidence import PAPER, Rates
 from mlci.inference import Inference

@@ -6,6 +6,7 @@ import io
 import json
 import os
 import re
+import shlex
 import shutil
 import sys
 import time
@@ -475,3 +476,19 @@ def test_demonstrations_that_are_not_there_are_told(
     status, _, err = look("demonstrations", point.identity, "--out", folder)
     assert "has not finished" in err
     assert not Path(folder).exists()
+
+
+@pytest.mark.parametrize("name", ["", *results._EXAMPLES])
+def test_help_fits_the_terminal_and_its_examples_can_be_typed(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    parser = results._parser()
+    with pytest.raises(SystemExit):
+        parser.parse_args([*name.split(), "--help"])
+    text = capsys.readouterr().out
+    assert max(map(len, text.splitlines())) <= 80
+    examples = re.findall(r"  python experiments/results\.py (.*)", text)
+    assert len(examples) == 3
+    for example in examples:
+        assert parser.parse_args(shlex.split(example)).command

@@ -18,8 +18,8 @@ from sweeps import faulty, gone, run, run_here, running, start, tables
 
 from experiments.app import REFUSED
 from experiments.config.read import ConfigError
-from experiments.console import job_names
 from experiments.sweep.planner import Planner
+from experiments.terminal import job_names
 
 
 def test_tables_do_not_depend_on_workers_order_or_repetition(tmp_path: Path) -> None:
