@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import html
+import importlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from mlci.credible_sets import CredibleSet, credible_set
 from mlci.crossings import ANY, Crossing
+from mlci.demonstrations import Demonstration
 from mlci.evidence import PAPER, Ranking, Rates, log_evidence, rank_constraints
 from mlci.forecasts import ForecastMap, is_possible, region_sizes
 from mlci.regions import Regions
@@ -225,5 +231,54 @@ class Inference:
             ]
         )
 
+    def evidence_frame(self) -> pd.DataFrame:
+        """A row a demonstration and hypothesis: `probability`, Phi; `forecast`, as it counts;
+        `violated`; `evidence` [nat]."""
+        pairs = [np.array(names, dtype=object) for names in (self.names, self.hypotheses.names)]
+        demonstrations, hypotheses = np.meshgrid(*pairs, indexing="ij")
+        columns = {
+            "demonstration": demonstrations,
+            "hypothesis": hypotheses,
+            "probability": self.phi,
+            "forecast": 1 - self.forecast,
+            "violated": self.violated,
+            "evidence": self.evidence,
+        }
+        return pd.DataFrame({name: column.ravel() for name, column in columns.items()})
+
+    def plot(self, demonstrations: Sequence[Demonstration] = (), **options: Any) -> Any:
+        """Draw the hypotheses in the colour of their gain, and the paths of demonstrations.
+
+        Args:
+            demonstrations: those whose paths are drawn.
+            options: `axes` and `dimensions`, as of `mlci.plot.draw_map`.
+
+        Returns:
+            Axes of matplotlib; `axes.figure.savefig` writes the picture.
+        """
+        return _plot().draw_map(self, demonstrations, **options)
+
+    def save(self, folder: str | Path, demonstrations: Sequence[Demonstration] = ()) -> Path:
+        """Write hypotheses.csv (`to_frame`), evidence.csv (`evidence_frame`) and map.png (`plot`).
+
+        Returns:
+            The folder, which is made if it is not there.
+        """
+        path = Path(folder)
+        path.mkdir(parents=True, exist_ok=True)
+        self.to_frame().to_csv(path / "hypotheses.csv", index=False)
+        self.evidence_frame().to_csv(path / "evidence.csv", index=False)
+        (path / "map.png").write_bytes(_plot().png(self.plot(demonstrations)))
+        return path
+
     def __repr__(self) -> str:
         return self.summary(_ROWS_OF_REPR)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the summary, and the map."""
+        return f"<pre>{html.escape(repr(self))}</pre>{_plot().html_image(self.plot())}"
+
+
+def _plot() -> Any:
+    """The module that draws: by its name, as no result depends on what a picture looks like."""
+    return importlib.import_module("mlci.plot")

@@ -15,11 +15,11 @@ import numpy as np
 
 import mlci
 from experiments.page.drawing import map_svg, plane_title
-from experiments.page.geometry import planes
 from experiments.page.numbers import page_numbers
 from experiments.page.words import answer_sentences, next_sentences, sentences_of
 from mlci.answers import Answer
 from mlci.demonstrations import Demonstration
+from mlci.planes import planes
 from mlci.regions import Regions
 
 # Colour-blind safe, from light to dark: matplotlib's YlGnBu, as the maps of the figures.

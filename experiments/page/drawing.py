@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.page.geometry import Plane, Rectangle, simplified
 from experiments.page.words import dimension_title
 from mlci.demonstrations import Demonstration
+from mlci.planes import Plane, Rectangle, simplified
 from mlci.regions import Regions
 from mlci.spaces import Floats
 

@@ -15,8 +15,8 @@ from page_answers import CIRCLE, answer_of
 
 from experiments.page.document import page
 from experiments.page.drawing import places
-from experiments.page.geometry import planes
 from mlci.forecasts import ForecastCurve, ForecastMap
+from mlci.planes import planes
 from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 

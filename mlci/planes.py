@@ -1,4 +1,4 @@
-"""What lies where in the plane of two state dimensions: boxes and paths, cut where the plane ends.
+"""Boxes and paths in the plane of two state dimensions, for pictures.
 
 A periodic dimension is shown once. A box that leaves it on one side comes in on the other, and a
 path ends at one side and goes on from the other.

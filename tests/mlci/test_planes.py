@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from page_answers import CIRCLE, wave
 
-from experiments.page.geometry import Plane, planes, simplified
+from mlci.planes import Plane, planes, simplified
 from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 
