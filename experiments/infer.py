@@ -37,8 +37,9 @@ from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
 from mlci.inference import Inference
 from mlci.maxent import ROUNDED_TIMES
-from mlci.recordings.read import Problem, read_demonstrations
-from mlci.simulate import step_count
+from mlci.recordings.read import Readings, read_demonstrations
+from mlci.recordings.recording import Remark
+from mlci.recordings.times import refuse_long
 from mlci.tabular import TabularModel, discretize
 from mlci.temperature import estimate_temperature
 from paper_figures import hypothesis_map
@@ -63,9 +64,11 @@ def main() -> int:
 def infer(settings: RecordedSettings) -> int:
     """Rank the hypotheses, print the result and save it; returns the exit status."""
     space = settings.model.space
-    demonstrations, problems = _usable(settings)
+    demonstrations, problems, notes = _read(settings)
     for problem in problems:
         print(f"not used: {problem}", file=sys.stderr)
+    for line in _together(notes):
+        print(f"note: {line}", file=sys.stderr)
     if not demonstrations:
         raise ConfigError("demonstrations: no file could be used; see above")
     model = _tabular_model(settings)
@@ -74,7 +77,7 @@ def infer(settings: RecordedSettings) -> int:
         store = Store(results_folder(settings) / "store")
         calibration = recorded_calibration(settings, model, demonstrations, store)
     forecast_map = None if calibration is None else calibration.map
-    exact_ends, rounded = settings.inference.exact_ends, settings.round_horizon
+    exact_ends = settings.inference.exact_ends
     inference = mlci.preparation.infer(
         model,
         demonstrations,
@@ -82,22 +85,22 @@ def infer(settings: RecordedSettings) -> int:
         rates=settings.inference.rates(calibrated=forecast_map is not None),
         calibration=forecast_map,
         exact_ends=exact_ends,
-        round_horizon=rounded,
         crossing=settings.crossing.crossing(),
+        round_horizon=True,
     )
     if settings.inference.rule_breaking == ESTIMATE:
         inference = inference.with_rule_breaking()
     temperature = None
     if settings.estimate_temperature:
         temperature = estimate_temperature(
-            model, demonstrations, inference, round_horizon=rounded, exact_ends=exact_ends
+            model, demonstrations, inference, round_horizon=True, exact_ends=exact_ends
         )
     ranking = ranking_table(inference)
     result = answer(
         model,
         demonstrations,
         inference,
-        round_horizon=rounded,
+        round_horizon=True,
         exact_ends=exact_ends,
         temperature=temperature,
     )
@@ -121,30 +124,44 @@ def infer(settings: RecordedSettings) -> int:
     return FAILED if problems else DONE
 
 
-def _usable(settings: RecordedSettings) -> tuple[list[Demonstration], list[Problem]]:
-    """The demonstrations that can be used, and what is wrong with the other files."""
-    read, problems = read_demonstrations(
+def _read(settings: RecordedSettings) -> Readings:
+    """The demonstrations that can be used, what is wrong with other files, and what was assumed."""
+    readings = read_demonstrations(
         settings.demonstrations,
         settings.model,
         dt=settings.recorded_dt,
+        columns=settings.columns,
+        units=settings.units,
+        time_unit=settings.time_unit,
         start=settings.start,
         goal=None if settings.goal is None else settings.goal.box(),
+        max_memory=settings.max_memory,
     )
-    usable = []
-    for demonstration in read:
-        duration = demonstration.task.horizon
+    usable, dt = [], settings.dt
+    for demonstration in readings.demonstrations:
+        duration, name = demonstration.task.horizon, demonstration.name
         try:
-            if not settings.round_horizon:
-                step_count(duration, settings.dt, ROUNDED_TIMES)
-        except ValueError:
-            message = (
-                f"dt = {settings.dt:g} s does not cut its {duration:g} s into whole steps: choose "
-                "another dt, or set round_horizon=true"
-            )
-            problems.append(Problem(demonstration.name, message))
-        else:
-            usable.append(demonstration)
-    return usable, problems
+            refuse_long(duration, dt, settings.max_duration)
+        except ValueError as error:
+            readings.problems.append(Remark(name, str(error)))
+            continue
+        usable.append(demonstration)
+        steps = max(1, round(duration / dt))
+        if abs(duration / dt - steps) > ROUNDED_TIMES:
+            message = f"its {duration:g} s count as {steps} steps of {dt:g} s, {steps * dt:g} s"
+            readings.notes.append(Remark(name, message))
+    return readings._replace(demonstrations=usable)
+
+
+def _together(remarks: Sequence[Remark]) -> list[str]:
+    """Remarks as lines, those of the same words in one."""
+    files: dict[str, list[str]] = {}
+    for remark in remarks:
+        files.setdefault(remark.message, []).append(remark.file)
+    return [
+        f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {message}"
+        for message, names in files.items()
+    ]
 
 
 def _tabular_model(settings: RecordedSettings) -> TabularModel:
@@ -176,7 +193,7 @@ def _refutation_lines(inference: Inference) -> list[str]:
 def _save(
     settings: RecordedSettings,
     demonstrations: Sequence[Demonstration],
-    problems: Sequence[Problem],
+    problems: Sequence[Remark],
     result: Answer,
     ranking: pd.DataFrame,
 ) -> Path:

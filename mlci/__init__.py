@@ -38,7 +38,8 @@ from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.preparation import PreparedInference, infer, prepare
 from mlci.reachability import SafeSet, solve_safe_set
-from mlci.recordings.read import read_demonstrations, write_demonstration
+from mlci.recordings.read import read_demonstrations
+from mlci.recordings.write import write_demonstration
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter
 from mlci.simulate import rollout

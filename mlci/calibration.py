@@ -200,7 +200,7 @@ def calibrate_on(
         return Calibration(tried, used)
     alpha = prepared.avoidance[can]
     paths = [each.states for each in demonstrations]
-    times = [each.dt * np.arange(len(each.states)) for each in demonstrations]
+    times = [each.times for each in demonstrations]
     hits = crossed(regions, paths, times, crossing)[can]
     open_pairs = ~(certain_by_ends(regions, tasks) | prepared.decided_by_cell)[can]
     counts = open_pairs & is_possible(alpha)

@@ -43,25 +43,25 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """A path that somebody took to do a task, sampled evenly.
+    """A path that somebody took to do a task, sampled at times that need not be even.
 
     Attributes:
         task: the task.
         states: (K+1, n) path, without jumps in periodic dimensions.
         controls: (K, m) controls held between the samples, or None where they are not known.
-        dt: time between samples [s].
+        times: (K+1,) time of each sample [s], rising from 0; `even_times` makes even ones.
         name: what tables and messages call it.
 
     Raises:
-        ValueError: fewer than two samples, shapes that disagree, numbers that are not finite, a
-            first sample further than 0.05 from the task's start, or a duration that is not the
-            task's horizon.
+        ValueError: fewer than two samples, shapes that disagree, numbers that are not finite, times
+            that do not rise from 0, a first sample further than 0.05 from the task's start, or a
+            duration that is not the task's horizon.
     """
 
     task: Task
     states: Floats
     controls: Floats | None
-    dt: float
+    times: Floats
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -86,23 +86,28 @@ class Demonstration:
                     f"{self._title} has {word} that are not finite, first {array[sample]} at "
                     f"sample {sample}"
                 )
+        times = np.array(self.times, dtype=float)
+        object.__setattr__(self, "times", times)
+        if times.shape != (len(states),):
+            raise ValueError(f"{self._title} needs {len(states)} times, not {times.shape}")
+        if times[0] != 0 or not np.all(np.diff(times) > 0) or not np.isfinite(times[-1]):
+            raise ValueError(f"{self._title} needs times that rise from 0, not {times}")
         if np.linalg.norm(states[0] - self.task.start) > REACHED:
             raise ValueError(f"{self._title} starts at {states[0]}, its task at {self.task.start}")
-        if not np.isclose((len(states) - 1) * self.dt, self.task.horizon, rtol=1e-6):
+        if not np.isclose(times[-1], self.task.horizon, rtol=1e-6):
             raise ValueError(
-                f"{self._title} lasts {len(states) - 1} x {self.dt} s, but its task "
-                f"{self.task.horizon} s"
+                f"{self._title} lasts {times[-1]} s, but its task {self.task.horizon} s"
             )
 
     @classmethod
     def from_path(
-        cls, states: ArrayLike, dt: float, *, goal: Box | None = None, name: str = ""
+        cls, states: ArrayLike, times: ArrayLike, *, goal: Box | None = None, name: str = ""
     ) -> Demonstration:
         """A recorded path whose task is read off its ends.
 
         Args:
             states: (K+1, n) path, without jumps in periodic dimensions (`StateSpace.unwrap`).
-            dt: time between samples [s].
+            times: time between samples, or (K+1,) rising times of any origin [s].
             goal: region that the demonstrator had to reach; None takes the last state.
             name: what tables and messages call it.
 
@@ -111,7 +116,10 @@ class Demonstration:
         """
         path = np.atleast_2d(np.asarray(states, dtype=float))
         region = Box.point(path[-1]) if goal is None else goal
-        return cls(Task(path[0], region, max(len(path) - 1, 1) * dt), path, None, dt, name)
+        given = np.asarray(times, dtype=float)
+        times = even_times(len(path), float(given)) if given.ndim == 0 else given - given[:1]
+        horizon = float(times[-1]) if len(path) > 1 and len(times) else 1.0
+        return cls(Task(path[0], region, horizon), path, None, times, name)
 
     @property
     def _title(self) -> str:
@@ -119,20 +127,24 @@ class Demonstration:
         return f"demonstration {self.name!r}" if self.name else "a demonstration"
 
 
+def even_times(samples: int, dt: float) -> Floats:
+    """Times (K+1,) of samples that are dt [s] apart, from 0."""
+    return np.arange(samples, dtype=float) * dt
+
+
 def departures(
-    task: Task, path: Floats, dt: float, space: StateSpace, tolerance: float = REACHED
+    task: Task, path: Floats, duration: float, space: StateSpace, tolerance: float = REACHED
 ) -> list[str]:
     """What a path does otherwise than its task says, a phrase each; empty if it does the task.
 
     Args:
         task: the task.
         path: states (K+1, n) of at least two samples; it may jump in periodic dimensions.
-        dt: time between samples [s].
+        duration: of the path [s].
         space: the state space, whose periodic dimensions are measured the short way round.
         tolerance: how far it may start from the task's start and end from its goal, Euclidean in
             raw units.
     """
-    duration = (len(path) - 1) * dt
     from_start = np.linalg.norm(space.difference(path[0], task.start))
     from_goal = np.linalg.norm(space.excess(path[-1], task.goal))
     phrases = []

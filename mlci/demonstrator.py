@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlci.control_problem import ControlFilter
-from mlci.demonstrations import REACHED, Demonstration, Task
+from mlci.demonstrations import REACHED, Demonstration, Task, even_times
 from mlci.ilqr import Solution, optimize
 from mlci.reachability import SafeSet
 from mlci.regions import Regions
@@ -289,7 +289,8 @@ def _best_of(
     for number, best in enumerate((np.arange(len(tasks)) * restarts + chosen).tolist()):
         outcome = list(Outcome)[int(np.argmax([*failures[:, best], True]))]
         path, controls = solution.states[best], solution.controls[best]
-        demonstration = Demonstration(tasks[number], path, controls, dt, f"trial_{number:03d}")
+        times, name = even_times(len(path), dt), f"trial_{number:03d}"
+        demonstration = Demonstration(tasks[number], path, controls, times, name)
         cost, miss, restart = float(solution.cost[best]), float(misses[best]), best % restarts
         attempts.append(Attempt(demonstration, outcome, cost, miss, restart))
     return attempts

@@ -13,7 +13,7 @@ _ITERATIONS = 10  # one is enough where the control enters linearly
 _GUESSES = 5  # values of each control from which the search may begin
 
 
-def controls_along(system: System, states: Floats, dt: float) -> Floats:
+def controls_along(system: System, states: Floats, times: Floats) -> Floats:
     """Controls (K, m) that lead from each sample of a path to the next, as nearly as any do.
 
     Least squares by Gauss-Newton steps, over the difference of a Runge-Kutta step from the next
@@ -22,9 +22,9 @@ def controls_along(system: System, states: Floats, dt: float) -> Floats:
     Args:
         system: the dynamics.
         states: (K+1, n) path.
-        dt: time between samples [s].
+        times: (K+1,) of the samples [s].
     """
-    before, after = states[:-1], states[1:]
+    before, after, dt = states[:-1], states[1:], np.diff(times)[:, None]
     widths, box = system.space.bounds.widths, system.control_box
 
     def difference(controls: Floats) -> Floats:
@@ -39,7 +39,7 @@ def controls_along(system: System, states: Floats, dt: float) -> Floats:
     controls, miss = guesses[np.argmin(misses, axis=0)], np.min(misses, axis=0)
     for _ in range(_ITERATIONS):
         _, by_control = RK4.rate_jacobians(system, before, controls, dt)
-        inverse = np.linalg.pinv(by_control * dt / widths[:, None])
+        inverse = np.linalg.pinv(by_control * dt[..., None] / widths[:, None])
         moved = controls + np.einsum("kij,kj->ki", inverse, difference(controls))
         moved_miss = np.linalg.norm(difference(moved), axis=1)
         better = moved_miss < miss
@@ -67,15 +67,17 @@ def path_reward(system: System, demonstration: Demonstration, steps: int) -> flo
         The reward at temperature 1 [nat].
     """
     states, controls = demonstration.states, demonstration.controls
+    times = demonstration.times
     if controls is None:
-        controls = controls_along(system, states, demonstration.dt)
-    samples, edges = np.arange(float(len(states))), np.linspace(0, len(controls), steps + 1)
-    sums = np.cumsum(np.vstack([np.zeros(controls.shape[1]), controls]), axis=0)
-    held = np.diff(_between(samples, sums, edges), axis=0) * (steps / len(controls))
-    reward = system.running_reward(_between(samples, states, edges[:-1]), held)
-    return float(np.sum(np.broadcast_to(reward, steps)) * demonstration.task.horizon / steps)
+        controls = controls_along(system, states, times)
+    edges, step = np.linspace(0, times[-1], steps + 1), times[-1] / steps
+    effects = controls * np.diff(times)[:, None]
+    sums = np.cumsum(np.vstack([np.zeros(controls.shape[1]), effects]), axis=0)
+    held = np.diff(_between(times, sums, edges), axis=0) / step
+    reward = system.running_reward(_between(times, states, edges[:-1]), held)
+    return float(np.sum(np.broadcast_to(reward, steps)) * step)
 
 
-def _between(samples: Floats, values: Floats, places: Floats) -> Floats:
-    """(Q, d) values (K+1, d) of samples, interpolated linearly at places (Q,)."""
-    return np.column_stack([np.interp(places, samples, column) for column in values.T])
+def _between(times: Floats, values: Floats, wanted: Floats) -> Floats:
+    """(Q, d) values (K+1, d) at times (K+1,), interpolated linearly at others (Q,)."""
+    return np.column_stack([np.interp(wanted, times, column) for column in values.T])

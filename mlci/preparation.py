@@ -81,8 +81,9 @@ class PreparedInference:
         """Rank the hypotheses by the demonstrations that have arrived, equations (4) to (6).
 
         Args:
-            paths: states (K+1, n) of each demonstration, sampled evenly.
-            dt: time between samples [s], of all paths or (N,) of each.
+            paths: states (K+1, n) of each demonstration.
+            dt: time between samples [s], of all paths or (N,) of each; the mean where it varies,
+                as only the duration counts.
             tasks: the number of each demonstration's task, in any order and as often as it was
                 done; by default each task was done once, in order.
             names: of the demonstrations; their numbers by default.
@@ -137,7 +138,8 @@ class PreparedInference:
             )
         if not np.all(np.isfinite(states)):
             raise ValueError(f"path {name!r} has states that are not finite")
-        if phrases := departures(self.tasks[number], states, dt, space, tolerance):
+        duration = (len(states) - 1) * dt
+        if phrases := departures(self.tasks[number], states, duration, space, tolerance):
             raise ValueError(f"path {name!r} does not do task {number}: {'; '.join(phrases)}")
         return states
 
@@ -195,7 +197,7 @@ def infer(
     ]
     return prepared.infer(
         paths,
-        [demonstration.dt for demonstration in demonstrations],
+        [each.times[-1] / (len(each.states) - 1) for each in demonstrations],
         names=names,
         prior_none=prior_none,
         rates=rates,

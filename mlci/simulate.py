@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from mlci.spaces import Floats
 from mlci.systems import System
 
-Step = Callable[[System, Floats, Floats, float], Floats]
-StepJacobians = Callable[[System, Floats, Floats, float], tuple[Floats, Floats]]
+Seconds = float | Floats  # one time step for all, or (..., 1) of each state
+Step = Callable[[System, Floats, Floats, Seconds], Floats]
+StepJacobians = Callable[[System, Floats, Floats, Seconds], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True)
@@ -46,12 +47,12 @@ def step_count(horizon: float, dt: float, tolerance: float = 1e-9) -> int:
     return steps
 
 
-def euler_step(system: System, states: Floats, controls: Floats, dt: float) -> Floats:
+def euler_step(system: System, states: Floats, controls: Floats, dt: Seconds) -> Floats:
     """One explicit Euler step: states (..., n) after dt [s], first order."""
     return states + dt * system.dynamics(states, controls)
 
 
-def rk4_step(system: System, states: Floats, controls: Floats, dt: float) -> Floats:
+def rk4_step(system: System, states: Floats, controls: Floats, dt: Seconds) -> Floats:
     """One classical Runge-Kutta step: states (..., n) after dt [s], fourth order."""
     k1 = system.dynamics(states, controls)
     k2 = system.dynamics(states + dt / 2 * k1, controls)
@@ -61,14 +62,14 @@ def rk4_step(system: System, states: Floats, controls: Floats, dt: float) -> Flo
 
 
 def euler_rate_jacobians(
-    system: System, states: Floats, controls: Floats, _dt: float
+    system: System, states: Floats, controls: Floats, _dt: Seconds
 ) -> tuple[Floats, Floats]:
     """dh/dx and dh/du: the rate of an Euler step is that of its start."""
     return system.jacobians(states, controls)
 
 
 def rk4_rate_jacobians(
-    system: System, states: Floats, controls: Floats, dt: float
+    system: System, states: Floats, controls: Floats, dt: Seconds
 ) -> tuple[Floats, Floats]:
     """Derivatives of the mean rate of a Runge-Kutta step, stage by stage by the chain rule."""
     stage = system.dynamics(states, controls)
@@ -77,8 +78,9 @@ def rk4_rate_jacobians(
     for reach, weight in ((dt / 2, 2), (dt / 2, 2), (dt, 1)):
         drift, push = system.jacobians(states + reach * stage, controls)
         stage = system.dynamics(states + reach * stage, controls)
-        by_state = drift + reach * (drift @ by_state)
-        by_control = push + reach * (drift @ by_control)
+        of_matrix = np.expand_dims(reach, -1)
+        by_state = drift + of_matrix * (drift @ by_state)
+        by_control = push + of_matrix * (drift @ by_control)
         sums = [sums[0] + weight * by_state, sums[1] + weight * by_control]
     return sums[0] / 6, sums[1] / 6
 

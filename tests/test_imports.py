@@ -59,8 +59,8 @@ MLCI = {
     "mlci.answers": "mlci.misfit mlci.support mlci.temperature",
     "mlci.metrics": "mlci.evidence",
 }
-# What mlci may import of others: no configs, no files' formats but Parquet, no figures.
-MATHEMATICS = "numpy scipy pandas pyarrow joblib"
+# What mlci may import of others: no configs, no formats but those of recordings, no figures.
+MATHEMATICS = "numpy scipy pandas pyarrow joblib pint openpyxl ezc3d"
 
 # A room of the framework, and all that it may import of this project.
 TRACKING, POINT = "experiments.tracking", "mlci experiments.config experiments.tracking"

@@ -9,8 +9,8 @@ import pandas as pd
 
 from experiments.lookback.archive import ArchiveError, Facts
 from experiments.tracking.store import Store
-from mlci.demonstrations import Demonstration, Task
-from mlci.recordings.read import write_demonstration
+from mlci.demonstrations import Demonstration, Task, even_times
+from mlci.recordings.write import write_demonstration
 from mlci.spaces import Box, StateSpace
 
 
@@ -44,11 +44,9 @@ def write_recordings(facts: Facts, folder: Path) -> list[Path]:
         goal = Box(trials["goal_lower"][number], trials["goal_upper"][number])
         task = Task(trials["starts"][number], goal, facts.config["horizon"])
         files.append(folder / f"trial_{number:03d}.csv")
-        write_demonstration(
-            files[-1],
-            Demonstration(task, trials["states"][number], trials["controls"][number], dt),
-            space,
-        )
+        states, controls = trials["states"][number], trials["controls"][number]
+        demonstration = Demonstration(task, states, controls, even_times(len(states), dt))
+        write_demonstration(files[-1], demonstration, space)
     return files
 
 

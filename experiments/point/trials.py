@@ -20,7 +20,7 @@ from experiments.config.settings import Settings
 from experiments.point.stages import corners, safe_set, system_module
 from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
-from mlci.demonstrations import Demonstration, Task
+from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.demonstrator import Attempt, Outcome, Trial, crossing, demonstrate, sample_trials
 from mlci.reachability import SafeSet
 from mlci.safety_filter import SafetyFilter, border_margin
@@ -71,9 +71,9 @@ class TrialSet:
         """
         goal = Box(self.goal_lower[trial], self.goal_upper[trial])
         task = Task(self.starts[trial], goal, horizon)
-        return Demonstration(
-            task, self.states[trial], self.controls[trial], dt, f"trial_{trial:03d}"
-        )
+        states, controls = self.states[trial], self.controls[trial]
+        times = even_times(len(states), dt)
+        return Demonstration(task, states, controls, times, f"trial_{trial:03d}")
 
     def counts(self) -> dict[str, int]:
         """How many trials had each outcome."""

@@ -106,7 +106,7 @@ def telescope_rows(settings: Settings, samples: int) -> list[Row]:
     )
     label = "telescope" + (f"_samples{samples}" if samples > 1 else "")
     prepared, paths = prepare(model, tasks), [each.states for each in demonstrations]
-    recorded, steps = sum(len(path) for path in paths), [each.dt for each in demonstrations]
+    recorded, steps = sum(len(path) for path in paths), [each.times[1] for each in demonstrations]
     return [
         Row(
             f"{label}_discretize",

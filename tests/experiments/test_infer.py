@@ -16,7 +16,7 @@ from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.reachability import solve_safe_set
-from mlci.recordings.read import write_demonstration
+from mlci.recordings.write import write_demonstration
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.spaces import Box
@@ -126,12 +126,22 @@ def test_the_temperature_is_told_on_demand(recorded: Path) -> None:
 
 
 def test_durations_that_dt_does_not_divide(recorded: Path) -> None:
-    refused = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.3")
+    done = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.3")
+    assert done.returncode == 0, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("note: trial_0")
+    assert line.endswith("more: its 5 s count as 17 steps of 0.3 s, 5.1 s")
+
+
+def test_times_in_milliseconds_are_refused_at_once(recorded: Path) -> None:
+    for path in (recorded / "recorded").iterdir():
+        table = pd.read_csv(path)
+        table.assign(time=table["time"] * 1000).to_csv(path, index=False)
+    refused = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.5")
     assert refused.returncode == 2
-    assert "does not cut its 5 s into whole steps" in refused.stderr
-    assert "round_horizon=true" in refused.stderr
+    assert "lasts 5000 s, 10000 steps of 0.5 s: is time in ms?" in refused.stderr
     assert not (recorded / "results").exists()
-    done = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.3", "round_horizon=true")
+    done = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.5", "time_unit=ms")
     assert done.returncode == 0, done.stderr
 
 

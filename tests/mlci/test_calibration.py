@@ -12,7 +12,7 @@ from mlci.calibration import (
     certain_by_ends,
     similar_tasks,
 )
-from mlci.demonstrations import Demonstration, Task
+from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.forecasts import fit_map, is_possible, region_sizes
 from mlci.grids import Grid
 from mlci.preparation import prepare
@@ -40,7 +40,11 @@ def test_the_map_is_fitted_on_all_and_judged_on_the_second_half(model: TabularMo
     rng = np.random.default_rng(2)
     paths = [
         Demonstration(
-            task, np.linspace(task.start, task.goal.lower, 11) + 0.0, None, 0.3, f"{number}"
+            task,
+            np.linspace(task.start, task.goal.lower, 11) + 0.0,
+            None,
+            even_times(11, 0.3),
+            f"{number}",
         )
         for number, task in enumerate(tasks(50))
     ]
@@ -83,7 +87,10 @@ def test_simulated_demonstrations_improve_the_forecasts() -> None:
 
 def test_demonstrations_stand_for_their_tasks(model: TabularModel) -> None:
     each = tasks(3)
-    paths = [Demonstration(t, np.linspace(t.start, t.goal.lower, 7), None, 0.5) for t in each]
+    paths = [
+        Demonstration(t, np.linspace(t.start, t.goal.lower, 7), None, even_times(7, 0.5))
+        for t in each
+    ]
     one, other = (calibrate(model, some, trials=30, restarts=1) for some in (each, paths))
     assert one.map == other.map
 

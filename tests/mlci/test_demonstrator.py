@@ -290,14 +290,18 @@ def test_trial_checks_itself():
         ({"states": np.pad([[np.nan, 0]], ((7, 3), (0, 0)))}, "states that are not .* sample 7"),
         ({"controls": np.full((10, 1), np.inf)}, "controls that are not finite, .* sample 0"),
         ({"states": np.full((11, 2), 0.5)}, r"starts at \[0\.5 0\.5\], its task at"),
-        ({"dt": 0.2}, r"lasts 10 x 0\.2 s, but its task 1\.0 s"),
+        ({"times": np.arange(11) * 0.2}, r"lasts 2\.0 s, but its task 1\.0 s"),
+        ({"times": np.arange(10) * 0.1}, r"needs 11 times, not \(10,\)"),
+        ({"times": np.arange(1, 12) * 0.1}, r"needs times that rise from 0, not \[0\.1"),
+        ({"times": np.array([0.0] * 10 + [1.0])}, "needs times that rise from 0"),
     ],
 )
 def test_demonstration_checks_itself(changes, message):
-    given = {"states": np.zeros((11, 2)), "controls": np.zeros((10, 1)), "dt": 0.1} | changes
+    given = {"states": np.zeros((11, 2)), "controls": np.zeros((10, 1))}
+    given = given | {"times": np.arange(11) * 0.1} | changes
     task = Task(np.zeros(2), Box.point([1.0, 0.0]), 1.0)
     with pytest.raises(ValueError, match=message):
-        Demonstration(task, given["states"], given["controls"], given["dt"], "lift")
+        Demonstration(task, given["states"], given["controls"], given["times"], "lift")
 
 
 def test_of_equal_restarts_the_first_is_taken_whatever_the_rounding():

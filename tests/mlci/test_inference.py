@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mlci.crossings import Crossing, crossed
-from mlci.demonstrations import REACHED, Demonstration, Task, departures
+from mlci.demonstrations import REACHED, Demonstration, Task, departures, even_times
 from mlci.evidence import DEFAULT_MODEL_ERROR, PAPER, Ranking, Rates, log_evidence, rank_constraints
 from mlci.grids import Grid
 from mlci.inference import Inference
@@ -56,7 +56,9 @@ def demonstration(task: int, seed: int) -> Demonstration:
     count = round(TASKS[task].horizon / 0.01)
     path = rollout(SYSTEM, TASKS[task].start, rng.uniform(-0.6, 0.6, (count, 1)), 0.01)
     path += np.linspace(0, 1, count + 1)[:, None] * (TASKS[task].goal.lower - path[-1])
-    return Demonstration(TASKS[task], path, None, 0.01, f"path {task}.{seed}")
+    return Demonstration(
+        TASKS[task], path, None, even_times(len(path), 0.01), f"path {task}.{seed}"
+    )
 
 
 def assert_same(one: Ranking, other: Ranking) -> None:
@@ -225,17 +227,18 @@ def test_a_path_ends_in_its_goal_the_short_way_round_and_within_the_tolerance() 
     space = Pendulum().space
     task = Task(np.array([6.0, 0.0]), Box([-0.1, -np.inf], [0.1, np.inf]), 1.0)
     path = np.linspace([6.0, 0.0], [2 * np.pi + 0.1 + REACHED, 3.0], 11)
-    assert departures(task, path, 0.1, space, REACHED + 1e-9) == []
-    assert departures(task, space.wrap(path), 0.1, space, REACHED + 1e-9) == []
-    (phrase,) = departures(task, path, 0.1, space, REACHED - 1e-9)
+    assert departures(task, path, 1.0, space, REACHED + 1e-9) == []
+    assert departures(task, space.wrap(path), 1.0, space, REACHED + 1e-9) == []
+    (phrase,) = departures(task, path, 1.0, space, REACHED - 1e-9)
     assert phrase == "it ends at (6.433, 3), 0.05 from the task's goal (-0.1, -inf) to (0.1, inf)"
-    assert departures(task, path, 0.1 * 1.0009, space, 0.06) == []
-    assert departures(task, path, 0.1 * 1.0011, space, 0.06) == ["it lasts 1.0011 s, the task 1 s"]
+    assert departures(task, path, 1.0009, space, 0.06) == []
+    assert departures(task, path, 1.0011, space, 0.06) == ["it lasts 1.0011 s, the task 1 s"]
 
 
 def test_a_demonstration_that_ends_elsewhere_is_refused(model: TabularModel) -> None:
     path = demonstration(0, 0).states
-    stray = Demonstration(TASKS[0], path + np.linspace(0, 0.2, len(path))[:, None], None, 0.01)
+    times = even_times(len(path), 0.01)
+    stray = Demonstration(TASKS[0], path + np.linspace(0, 0.2, len(path))[:, None], None, times)
     with pytest.raises(ValueError, match=r"'0' does not do task 0: it ends at \(1.2, 0.2\), 0.283"):
         infer(model, [stray])
     assert len(infer(model, [stray], tolerance=0.3).names) == 1
@@ -305,7 +308,7 @@ PILLARS = Regions.from_boxes(
 def test_what_only_a_cell_makes_certain_is_no_evidence_and_is_named() -> None:
     model = discretize(WALKER, Grid(FLOOR, (4, 3)), action_grid(WALKER, 3), 1.0, PILLARS)
     path = np.linspace([0.9, 1.1], [3.5, 1.5], 301)
-    beside = Demonstration(Task(path[0], Box.point(path[-1]), 3.0), path, None, 0.01, "beside")
+    beside = Demonstration.from_path(path, 0.01, name="beside")
     of_cells, inference = papers(model, [beside]), infer(model, [beside], rates=PAPER)
     assert of_cells.gain[0] == np.inf
     assert of_cells.outcomes.tolist() == ["unavoidable", "violated"]
@@ -326,7 +329,7 @@ def test_what_only_a_cell_makes_certain_is_no_evidence_and_is_named() -> None:
 def test_a_crossing_may_be_asked_to_be_deep_and_to_last(model: TabularModel) -> None:
     demonstrations = [demonstration(task, seed) for seed, task in enumerate([2, 0])]
     paths = [each.states for each in demonstrations]
-    times = [each.dt * np.arange(len(each.states)) for each in demonstrations]
+    times = [each.times for each in demonstrations]
     counts = Crossing(depth=0.2, time=0.3)
     inference = infer(model, demonstrations, crossing=counts)
     assert inference.crossing == counts

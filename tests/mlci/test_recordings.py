@@ -5,8 +5,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mlci.demonstrations import Demonstration, Task
-from mlci.recordings.read import read_demonstrations, write_demonstration
+from mlci.demonstrations import Demonstration, Task, even_times
+from mlci.recordings.files import FORMATS
+from mlci.recordings.read import read_demonstrations
+from mlci.recordings.write import write_demonstration
 from mlci.simulate import euler_step, rollout
 from mlci.spaces import Box
 from mlci.systems import Pendulum
@@ -22,12 +24,14 @@ def swing():
     controls = np.random.default_rng(0).uniform(-1, 1, (300, 1))
     states = rollout(PENDULUM, [1.0, 2.5], controls, 0.01, step=euler_step)
     assert states[-1, 0] > 2.5 * np.pi
-    return Demonstration(Task(states[0], Box.point(states[-1]), 3.0), states, controls, 0.01)
+    return Demonstration(
+        Task(states[0], Box.point(states[-1]), 3.0), states, controls, even_times(301, 0.01)
+    )
 
 
 def read_one(path, **options):
     """The demonstration of a file that can be used."""
-    (demonstration,), problems = read_demonstrations(path, PENDULUM, **options)
+    (demonstration,), problems, _ = read_demonstrations(path, PENDULUM, **options)
     assert problems == []
     return demonstration
 
@@ -35,7 +39,7 @@ def read_one(path, **options):
 def problem_with(path, text, **options):
     """What is wrong with a file of this content."""
     path.write_text(text)
-    demonstrations, (problem,) = read_demonstrations(path, PENDULUM, **options)
+    demonstrations, (problem,), _ = read_demonstrations(path, PENDULUM, **options)
     assert demonstrations == []
     assert problem.file == str(path)
     assert str(problem) == f"{path}: {problem.message}"
@@ -45,7 +49,7 @@ def problem_with(path, text, **options):
 def assert_same(read, written, controls=True):
     """The same samples, bit by bit, with start and goal off the ends."""
     assert np.array_equal(read.states, written.states)
-    assert read.dt == written.dt
+    assert np.allclose(read.times, written.times, rtol=1e-12, atol=0)
     assert read.task.horizon == pytest.approx(written.task.horizon, rel=1e-12)
     assert np.array_equal(read.task.start, written.states[0])
     assert np.array_equal(read.task.goal.lower, written.states[-1])
@@ -67,7 +71,7 @@ def test_csv_with_header_comes_back_bit_by_bit(tmp_path, swing):
         "goal_upper_angle,goal_upper_angular_velocity"
     )
     assert len(lines) == 302
-    bare = Demonstration(swing.task, swing.states, None, swing.dt)
+    bare = Demonstration(swing.task, swing.states, None, swing.times)
     write_demonstration(tmp_path / "bare.csv", bare, PENDULUM.space)
     assert_same(read_one(tmp_path / "bare.csv"), swing, controls=False)
 
@@ -79,7 +83,7 @@ def test_a_goal_comes_back_bit_by_bit(tmp_path, swing, suffix, controls):
     end = swing.states[-1, 0]
     goal = Box([end - 2 * np.pi - 1 / 3, -np.inf], [end - 2 * np.pi + 1e-3, np.inf])
     task = Task(swing.states[0], goal, 3.0)
-    written = Demonstration(task, swing.states, swing.controls if controls else None, 0.01)
+    written = Demonstration(task, swing.states, swing.controls if controls else None, swing.times)
     path = tmp_path / f"a.{suffix}"
     write_demonstration(tmp_path / "a.csv", written, PENDULUM.space)
     if suffix == "parquet":
@@ -109,7 +113,7 @@ def test_a_goal_that_is_none_is_named(tmp_path):
         assert "a goal that is no box" in message
     assert "has 0 sample(s)" in problem_with(path, head)
     np.savez(tmp_path / "a.npz", states=np.ones((3, 2)), dt=1, goal_lower=[1], goal_upper=[1, 1])
-    _, (problem,) = read_demonstrations(tmp_path / "a.npz", PENDULUM)
+    _, (problem,), _ = read_demonstrations(tmp_path / "a.npz", PENDULUM)
     assert "needs 'goal_lower' and 'goal_upper' of shape (2,)" in problem.message
 
 
@@ -130,7 +134,7 @@ def test_numpy_archive(tmp_path, swing, extra):
     assert_same(read_one(tmp_path / "a.npz"), swing)
     second = read_one(tmp_path / "b.npz")
     assert second.controls is None
-    assert second.dt == pytest.approx(0.01, rel=1e-12)
+    assert second.times[1] == pytest.approx(0.01, rel=1e-12)
 
 
 def test_parquet(tmp_path, swing):
@@ -143,7 +147,7 @@ def test_parquet(tmp_path, swing):
         pyarrow.table(dict(zip(names, columns, strict=True))), tmp_path / "a.parquet"
     )
     assert_same(read_one(tmp_path / "a.parquet"), swing, controls=False)
-    assert "is not a parquet table" in problem_with(tmp_path / "b.parquet", "no table")
+    assert "is damaged, or no .parquet file" in problem_with(tmp_path / "b.parquet", "no table")
 
 
 def test_parquet_without_its_package_says_what_to_install(tmp_path, monkeypatch):
@@ -160,7 +164,10 @@ def test_parquet_without_its_package_says_what_to_install(tmp_path, monkeypatch)
 
 def test_jumps_at_the_seam_are_undone(tmp_path, swing):
     wrapped = Demonstration(
-        Task(swing.states[0], swing.task.goal, 3.0), PENDULUM.space.wrap(swing.states), None, 0.01
+        Task(swing.states[0], swing.task.goal, 3.0),
+        PENDULUM.space.wrap(swing.states),
+        None,
+        swing.times,
     )
     write_demonstration(tmp_path / "a.csv", wrapped, PENDULUM.space)
     np.testing.assert_allclose(read_one(tmp_path / "a.csv").states, swing.states, atol=1e-12)
@@ -171,7 +178,7 @@ def test_columns_in_any_order_rounded_times_blank_lines_and_a_byte_order_mark(tm
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     read = read_one(tmp_path / "a.csv")
     assert read.states.tolist() == [[1, 2], [1.1, 2], [1.2, 2]]
-    assert read.dt == pytest.approx(0.0335)
+    assert read.times.tolist() == [0, 0.033, 0.067]
 
 
 def test_controls_are_never_needed(tmp_path):
@@ -206,11 +213,10 @@ def test_start_and_goal_may_be_given(tmp_path):
         (HEADER + "0,1,0\n", r"has 1 sample\(s\)"),
         ("1\n2\n3\n", r"has 1 sample\(s\)"),
         (GOOD + "0.4,nan,0.5\n", "line 6: angle = nan is not a finite number"),
-        (GOOD + "0.4,1.2,\n", "line 6, column 'angular_velocity': '' is not a number"),
+        (GOOD + "0.4,1.2,\n", "line 6: angular_velocity = nan is not a finite number"),
         (GOOD + "0.4,oops,0.5\n", "line 6, column 'angle': 'oops' is not a number"),
-        (GOOD + "0.4,1.2\n", "line 6 has 2 values where line 1 has 3"),
+        (GOOD + "0.4,1.2\n", "line 6 has 2 values where the header has 3"),
         (GOOD + "0.4,1.2,6.5\n", r"line 6: angular_velocity = 6\.5 leaves .*\(bounds -6 to 6\)"),
-        (GOOD + "0.5,1.2,0.5\n", r"line 6: time goes from 0\.3 to 0\.5 s where a step is 0\.1 s"),
         (GOOD + "0.3,1.2,0.5\n", r"line 6: time goes from 0\.3 to 0\.3 s"),
         (GOOD + "nan,1.2,0.5\n", r"line 6: time goes from 0\.3 to nan s"),
         (HEADER + "0,1,0\n0,1,0\n", r"line 3: time goes from 0 to 0 s"),
@@ -218,7 +224,10 @@ def test_start_and_goal_may_be_given(tmp_path):
         (HEADER + "1,1,0\n0,1,0\n", r"line 3: time goes from 1 to 0 s"),
         ("time,theta,angular_velocity\n0,1,0\n", r"no column angle in its header \(time, theta"),
         ("what is this\nreally\n", "no column time or angle or angular_velocity"),
-        ("1,2\n3,4\n5,6\n7,8\n", r"no header and 4 lines: it needs 2 lines .* or 3 .*time,angle,"),
+        (
+            "1,2\n3,4\n5,6\n7,8\n",
+            r"no header and 4 lines of 2 values: it needs 2 lines .* or 3 .*time,angle,",
+        ),
         ("1,2,3\n0,nan,0\n", "line 2, column 2: angular_velocity = nan"),
         ("1,2,3\n0,x,0\n", "line 2, column 2: 'x' is not a number"),
         ("1,2,3\n0,0,-7\n", "line 2, column 3: angular_velocity = -7 leaves"),
@@ -232,34 +241,34 @@ def test_what_is_wrong_with_a_text_is_named(tmp_path, text, message):
 def test_what_is_wrong_with_an_archive_is_named(tmp_path):
     def message(**arrays):
         np.savez(tmp_path / "a.npz", **arrays)
-        _, (problem,) = read_demonstrations(tmp_path / "a.npz", PENDULUM)
+        _, (problem,), _ = read_demonstrations(tmp_path / "a.npz", PENDULUM)
         return problem.message
 
     states = np.zeros((5, 2))
-    assert "needs an array 'states' of shape (K+1, 2); it holds {'x': (3,)}" in message(x=[1, 2, 3])
-    assert "(2, 5)" in message(states=states.T, dt=0.1)
-    assert "'time' of shape (K+1,) or a number 'dt'" in message(states=states)
-    assert "needs 'time' of shape (5,), not (4,)" in message(states=states, time=np.arange(4))
-    assert "sample 1: time goes from" in message(states=states, dt=-1.0)
+    assert "has no column angle or angular_velocity in its header (x)" in message(x=[1, 2, 3], dt=1)
+    assert "'states' of shape (K+1, 2), not (K+1, 5)" in message(states=states.T, dt=0.1)
+    assert "needs 'states' of shape (4,), not (5, 2)" in message(states=states, time=np.arange(4))
+    assert "needs a time step dt above 0, not -1 s" in message(states=states, dt=-1.0)
     states[3, 0] = np.inf
     assert "sample 3: angle = inf is not a finite number" in message(states=states, dt=0.1)
-    assert "not an archive of numeric arrays" in message(states=np.array([{}]))
-    assert "not an archive of numeric arrays" in problem_with(tmp_path / "b.npz", "PK, no zip")
-    assert "not an archive of numeric arrays" in problem_with(tmp_path / "b.npz", "")
+    assert "array 'states.npy' is of object, not of numbers" in message(states=np.array([{}]))
+    assert "is damaged, or no .npz file" in problem_with(tmp_path / "b.npz", "PK, no zip")
+    assert "is damaged, or no .npz file" in problem_with(tmp_path / "b.npz", "")
 
 
 def test_bytes_that_are_no_text_are_named(tmp_path):
-    (tmp_path / "a.csv").write_bytes(b"\xff\xfe\x00\x01" * 20)
-    _, (problem,) = read_demonstrations(tmp_path / "a.csv", PENDULUM)
-    assert "is not comma-separated text" in problem.message
+    (tmp_path / "a.csv").write_bytes(b"1,2\n\x00\x01" * 20)
+    _, (problem,), _ = read_demonstrations(tmp_path / "a.csv", PENDULUM)
+    assert "line 2: is not text (character 0)" in problem.message
 
 
 def test_one_bad_file_does_not_lose_the_others(tmp_path):
     for name, text in (("b", GOOD), ("a", "oops"), ("c", GOOD), ("d", HEADER)):
         (tmp_path / f"{name}.csv").write_text(text)
-    (tmp_path / "notes.txt").write_text("ignored in a folder")
-    for paths in (tmp_path, str(tmp_path / "*.csv"), sorted(tmp_path.glob("*.csv"))):
-        demonstrations, problems = read_demonstrations(paths, PENDULUM)
+    (tmp_path / "notes.pdf").write_text("ignored in a folder")
+    (tmp_path / "._b.csv").write_text("hidden")
+    for paths in (tmp_path, str(tmp_path / "*.csv"), [tmp_path / f"{name}.csv" for name in "abcd"]):
+        demonstrations, problems, _ = read_demonstrations(paths, PENDULUM)
         assert [item.name for item in demonstrations] == ["b", "c"]
         assert [item.file for item in problems] == [str(tmp_path / f"{x}.csv") for x in "ad"]
 
@@ -270,7 +279,7 @@ def test_paths_that_stand_for_nothing_twice_the_same_or_alike(tmp_path):
     for folder in (tmp_path, tmp_path / "other"):
         (folder / "a.csv").write_text(GOOD)
     names = ["none.csv", "no*.csv", "empty", "a.csv", "*.csv", "other"]
-    found, problems = read_demonstrations([tmp_path / name for name in names], PENDULUM)
+    found, problems, _ = read_demonstrations([tmp_path / name for name in names], PENDULUM)
     assert [item.name for item in found] == [
         str(tmp_path / "a.csv"),
         str(tmp_path / "other" / "a.csv"),
@@ -278,9 +287,9 @@ def test_paths_that_stand_for_nothing_twice_the_same_or_alike(tmp_path):
     assert [str(item).split(": ")[1] for item in problems] == [
         "there is no such file",
         "there is no such file",
-        "holds no .csv or .npz or .parquet file",
+        f"holds no {' or '.join(FORMATS)} file",
     ]
-    assert "cannot read '.txt' files" in problem_with(tmp_path / "a.txt", GOOD)
+    assert "cannot read '.pdf' files" in problem_with(tmp_path / "a.pdf", GOOD)
 
 
 def test_time_step_must_be_positive(tmp_path):

@@ -214,7 +214,7 @@ def direct(task: Task, wave: float, known: bool = True) -> Demonstration:
     held = (time + 0.005)[:-1]
     control = a + b * held + wave * turn**2 * np.cos(turn * held)
     states = np.column_stack([place, speed])
-    return Demonstration(task, states, control[:, None] if known else None, 0.01)
+    return Demonstration(task, states, control[:, None] if known else None, time)
 
 
 def test_a_swing_of_no_use_is_warm_and_the_cheapest_path_cold(tasks: list[Task]) -> None:

@@ -220,7 +220,16 @@ def cases(random_: random.Random) -> Iterator[Case]:
         "null",
     ):
         yield Case("infer", (f"demonstrations={value}",), ("demonstrations", "nothing"))
-    for key in ("recorded_dt", "top", "start", "goal", "round_horizon", "demonstration", "truth"):
+    for key in (
+        "recorded_dt",
+        "top",
+        "start",
+        "goal",
+        "columns",
+        "time_unit",
+        "demonstration",
+        "truth",
+    ):
         for value in ("fast", "[a]", "-1"):
             yield Case("infer", ("demonstrations=x.csv", f"{key}={value}"), (key, "x.csv"))
 

@@ -67,10 +67,30 @@ class RecordedSettings(ModelSettings):
             "of the state",
         ),
     ]
-    round_horizon: Annotated[
-        Flag,
-        about("take the nearest whole number of time steps where dt does not divide a duration"),
+    columns: Annotated[
+        dict[Word, Word],
+        about(
+            "name of a column of the files by ours, as in {angle: theta, time: t}; `states` is an "
+            "array of all states. Case, units in brackets, spaces and dashes make no difference"
+        ),
     ]
+    units: Annotated[
+        dict[Word, Word],
+        about(
+            "unit of a state in the files, as in {angle: deg}; else what they say, or the system's"
+        ),
+    ]
+    time_unit: Annotated[
+        Word | None,
+        about(
+            "unit of time in the files, such as ms; `samples` for numbers of samples that are "
+            "recorded_dt apart; null for what they say, or seconds"
+        ),
+    ]
+    max_duration: Annotated[
+        Positive, about("a demonstration that lasts longer is refused: time is in ms?", "s")
+    ]
+    max_memory: Annotated[Positive, about("what reading one file may take", "MB")]
     crossing: CrossingSettings
     estimate_temperature: Annotated[
         Flag,
