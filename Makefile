@@ -2,7 +2,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 # The studies that the report needs, and all others; the experiment `smoke` repeats the paper's.
-STUDIES := paper telescope sensitivity in_cell calibration readings rule_breaking wrong_model
+STUDIES := paper telescope sensitivity in_cell calibration readings control_noise rule_breaking wrong_model
 OTHERS := $(filter-out $(STUDIES) smoke,$(basename $(notdir $(wildcard conf/experiment/*.yaml))))
 
 .PHONY: help paper studies figures report smoke test stress lint benchmark lock

@@ -141,6 +141,8 @@ def _summary_table(
             f"frozen_{name}": share
             for name, share in zip(settings.model.space.names, diagnosis.frozen, strict=True)
         },
+        **{f"noise_{i + 1}": noise for i, noise in enumerate(diagnosis.noise)},
+        **{f"free_noise_{i + 1}": noise for i, noise in enumerate(diagnosis.free_noise)},
     }
     return pd.DataFrame([row])
 

@@ -14,6 +14,7 @@ from paper_figures.report import (
     claim_6,
     section_beliefs,
     section_choices,
+    section_control_noise,
     section_costs,
     section_evidence,
     section_origin,
@@ -68,6 +69,7 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
             Figure("sensitivity", "choice_effects_c2", "One choice changed at a time, truth C2."),
         ),
     ),
+    ("Control noise: how much of claims 2 and 3 it explains", section_control_noise.section, ()),
     (
         "Readings of the paper: claims 1 and 4 together",
         section_readings.section,

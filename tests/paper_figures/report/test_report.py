@@ -25,6 +25,7 @@ from paper_figures.report import (
     page,
     section_beliefs,
     section_choices,
+    section_control_noise,
     section_costs,
     section_evidence,
     section_start_points,
@@ -389,6 +390,33 @@ def test_evidence_is_compared_and_judged(tmp_path: Path) -> None:
     assert "0.0700 after 10 demonstrations, not within 0.05." in worse
 
 
+def test_control_noise_explains_what_changes_with_few_actions_alone(tmp_path: Path) -> None:
+    change = {9: (0.8, 0.4), 25: (0.4, 0.3)}  # at dt 0.1 and 1 s
+    setting = {"truth": "c1", "cells": 400}
+    rows = [
+        {**setting, "actions": count, "dt": dt, "measure": name}
+        | {"mean": mean, "low": mean - 0.01, "high": mean + 0.01}
+        for name in section_control_noise.MEASURES
+        for count, means in change.items()
+        for dt, mean in zip((0.1, 1.0), means, strict=True)
+    ]
+    noise = [
+        {**setting, "actions": count, "dt": dt, "noise_1": value, "free_noise_1": 0.5}
+        for count, dt, value in ((9, 0.1, 0.15), (9, 1.0, 0.49), (25, 0.1, 0.48), (25, 1.0, 0.49))
+    ]
+    tables = {"measures": pd.DataFrame(rows), "summary": pd.DataFrame(noise)}
+    write(tmp_path, "control_noise", **tables)
+    text = section_control_noise.section(Results(tmp_path))
+    assert "C1 at 400 cells -50 % and -25 %" in text
+    # log 2 against log 4 / 3.
+    assert "the noise explains 58 % of that" in text
+    assert "| C1 | 400 | 0.1 s | 0.150 | 0.480 | 0.800 [0.790, 0.810] | 0.400 [0.390" in text
+    few = tables["measures"].query("actions == 9")
+    write(tmp_path / "one", "control_noise", measures=few, summary=tables["summary"])
+    with pytest.raises(Missing, match="one set of actions"):
+        section_control_noise.section(Results(tmp_path / "one"))
+
+
 def test_times_are_in_units_that_suit_them(tmp_path: Path) -> None:
     machine = {
         "cpu": "a cpu",
@@ -440,10 +468,10 @@ def test_in_cell_sampling_counts_where_the_truth_is_found(results: Results) -> N
 def test_what_is_not_there_is_told_with_its_command(results: Results) -> None:
     text = report(results)
     studies = ("telescope", "sensitivity", "calibration", "in_cell", "readings", "wrong_model")
-    for study in (*studies, "rule_breaking"):
+    for study in (*studies, "rule_breaking", "control_noise"):
         assert f"`python experiments/run.py -m experiment={study}` makes it." in text
     assert "`make benchmark` makes it." in text
-    assert text.count("Not there yet") == 9  # two sections read the study of calibration
+    assert text.count("Not there yet") == 10  # two sections read the study of calibration
     few = results.table("paper", "measures").query("cells != 900")
     write(results.folder, "paper", measures=few)
     with pytest.raises(Missing, match=r"no point with truth c1, 900 cells and dt 0\.1 s"):
