@@ -59,10 +59,15 @@ def _judgement(means: pd.DataFrame, measure: str, counts: list[int]) -> str:
         + " and ".join(percent(row[count]) for count in (counts[0], counts[-1]))
         for (truth, cells), row in change.iterrows()
     )
-    few, many = (float(np.abs(np.log1p(change[count])).mean()) for count in (counts[0], counts[-1]))
-    explained = "none" if many >= few else percent(1 - many / few)
+    both = np.log1p(change[[counts[0], counts[-1]]].dropna()).mean()
+    few, many = both.tolist()
+    explained = (
+        f"the noise explains {percent(1 - many / few)} of that"
+        if abs(many) < abs(few)
+        else f"the noise hides {percent(1 - few / many)} of what the time step does"
+    )
     steps = f"from dt {values.columns[0]:g} to {values.columns[-1]:g} s"
     return (
         f"The {MEASURES[measure]} changes {steps} by (with {counts[0]} and {counts[-1]} actions): "
-        f"{changes}. On a logarithmic scale the noise explains {explained} of that."
+        f"{changes}. On a logarithmic scale, where both can do the tasks, {explained}."
     )

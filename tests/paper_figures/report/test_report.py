@@ -411,6 +411,11 @@ def test_control_noise_explains_what_changes_with_few_actions_alone(tmp_path: Pa
     # log 2 against log 4 / 3.
     assert "the noise explains 58 % of that" in text
     assert "| C1 | 400 | 0.1 s | 0.150 | 0.480 | 0.800 [0.790, 0.810] | 0.400 [0.390" in text
+    # With the noise held the change is the larger one: log 4 / 3 against log 2.
+    swapped = tables["measures"].assign(actions=tables["measures"]["actions"].map({9: 25, 25: 9}))
+    write(tmp_path / "swapped", "control_noise", measures=swapped, summary=tables["summary"])
+    hidden = section_control_noise.section(Results(tmp_path / "swapped"))
+    assert "the noise hides 58 % of what the time step does" in hidden
     few = tables["measures"].query("actions == 9")
     write(tmp_path / "one", "control_noise", measures=few, summary=tables["summary"])
     with pytest.raises(Missing, match="one set of actions"):
