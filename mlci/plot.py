@@ -20,7 +20,7 @@ from mlci.planes import Plane, planes
 
 TOP = 5  # regions whose rank is written on the map
 _COLOURS = "YlGnBu"  # safe for the colour-blind, and told apart in grey
-_VIOLATED, _UNAVOIDABLE, _PATH, _EDGE = "#e8e8e8", "#1a1a1a", "#444444", "#b0b0b0"
+_RULED_OUT, _UNAVOIDABLE, _PATH, _EDGE = "#e8e8e8", "#1a1a1a", "#444444", "#b0b0b0"
 _NEARLY_NONE = 1e-3  # nat: the top of the scale if no gain is larger
 
 
@@ -32,8 +32,8 @@ def draw_map(
 ) -> Axes:
     """Draw hypotheses in the colour of their gain, the ranks of the first five, and paths.
 
-    Of hypotheses that lie on one another the likeliest is seen. One that a demonstration enters is
-    grey, one of infinite gain black. A path leads from a dot to a square.
+    Of hypotheses that lie on one another the likeliest is seen. One that a demonstration rules out
+    is grey, one of infinite gain black. A path leads from a dot to a square.
 
     Args:
         inference: whose hypotheses are drawn.
@@ -43,7 +43,6 @@ def draw_map(
             that hypotheses bound.
     """
     regions, gain, rank = inference.hypotheses, inference.gain, inference.ranking.rank
-    violated = np.any(inference.violated, axis=0)
     if axes is None:
         axes = Figure(figsize=(6.0, 4.5), layout="constrained").subplots()
     plane = planes(regions)[0] if dimensions is None else Plane(regions.space, *dimensions)
@@ -53,8 +52,8 @@ def draw_map(
     colours = ScalarMappable(scale, _COLOURS)
     for i in np.argsort(-rank, kind="stable"):
         colour: Any = colours.to_rgba(np.clip(gain[i], 0.0, scale.vmax))
-        if violated[i]:
-            colour = _VIOLATED
+        if gain[i] == -np.inf:
+            colour = _RULED_OUT
         elif gain[i] == np.inf:
             colour = _UNAVOIDABLE
         boxes = plane.rectangles(regions.box(int(i)))
@@ -62,7 +61,7 @@ def draw_map(
             patch = Rectangle((left, low), right - left, high - low, facecolor=colour)
             patch.set(edgecolor=_EDGE, linewidth=0.4)
             axes.add_patch(patch)
-        if boxes and rank[i] <= TOP and gain[i] > 0 and not violated[i]:
+        if boxes and rank[i] <= TOP and gain[i] > 0:
             _number(axes, boxes[0], float(rank[i]))
     for demonstration in demonstrations:
         _draw_path(axes, plane, demonstration)

@@ -46,9 +46,9 @@
     return "#" + channel(0) + channel(1) + channel(2);
   };
   const fill = (i) => {
-    if (entries(i)) return "url(#entered)";
+    if (gain(i) === null) return "url(#entered)";
     if (gain(i) === "inf") return "#1a1a1a";
-    if (unseen.has(i)) return "url(#unseen)";
+    if (unseen.has(i) && !entries(i)) return "url(#unseen)";
     return mixed(Math.sqrt(Math.min(Math.max(size(gain(i)), 0), data.top) / data.top));
   };
 
@@ -81,7 +81,7 @@
   };
 
   const drawMap = () => {
-    const first = order().filter((i) => size(gain(i)) > 0 && !entries(i)).slice(0, BEST);
+    const first = order().filter((i) => size(gain(i)) > 0).slice(0, BEST);
     maps.forEach((it, k) => { it.figure.hidden = k !== state.plane; });
     const here = map();
     here.places.forEach((one) => {
