@@ -67,7 +67,7 @@ def run_command(
     Args:
         config_name: a file of conf/.
         act: takes the resolved config and returns the exit status.
-        failures: errors of a sweep that say all there is to say.
+        failures: errors that say all there is to say.
 
     Returns:
         the status of `act`; FAILED, REFUSED for a wrong config, or STOPPED after Ctrl-C.
@@ -87,6 +87,9 @@ def run_command(
         except ConfigError as error:
             print(error, file=sys.stderr)
             raise SystemExit(REFUSED) from None
+        except failures as error:
+            print(error, file=sys.stderr)
+            raise SystemExit(FAILED) from None
         except Exception:
             traceback.print_exc()
             raise SystemExit(FAILED) from None

@@ -20,13 +20,14 @@ import pandas as pd
 import mlci.preparation
 from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
-from experiments.config.read import ConfigError, read_recorded_config
+from experiments.config.read import ConfigError, read_recorded_config, writable_results
 from experiments.config.settings import ESTIMATE, RecordedSettings
 from experiments.console import answer_lines, diagnosis_lines
 from experiments.page.document import page
 from experiments.point.forecasts import recorded_calibration
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.truth_tables import dimension_table
+from experiments.progress import begin, steps_shown
 from experiments.terminal import entry
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, replace_file
@@ -61,21 +62,27 @@ def main() -> int:
     return run_command("infer", lambda tree: infer(read_recorded_config(tree)))
 
 
+@steps_shown()
 def infer(settings: RecordedSettings) -> int:
     """Rank the hypotheses, print the result and save it; returns the exit status."""
     space = settings.model.space
+    begin("reading files")
     demonstrations, problems, notes = _read(settings)
+    begin("")
     for problem in problems:
         print(f"not used: {problem}", file=sys.stderr)
     for line in _together(notes):
         print(f"note: {line}", file=sys.stderr)
     if not demonstrations:
         raise ConfigError("demonstrations: no file could be used; see above")
+    results = writable_results(settings)
+    begin("forming the tabular model")
     model = _tabular_model(settings)
     calibration = None
     if settings.inference.calibrate:
-        store = Store(results_folder(settings) / "store")
+        store = Store(results / "store")
         calibration = recorded_calibration(settings, model, demonstrations, store)
+    begin(f"ranking {len(settings.candidates)} hypotheses")
     forecast_map = None if calibration is None else calibration.map
     exact_ends = settings.inference.exact_ends
     inference = mlci.preparation.infer(
@@ -92,6 +99,7 @@ def infer(settings: RecordedSettings) -> int:
         inference = inference.with_rule_breaking()
     temperature = None
     if settings.estimate_temperature:
+        begin("estimating the temperature")
         temperature = estimate_temperature(
             model, demonstrations, inference, round_horizon=True, exact_ends=exact_ends
         )
@@ -104,6 +112,7 @@ def infer(settings: RecordedSettings) -> int:
         exact_ends=exact_ends,
         temperature=temperature,
     )
+    begin("")
     for line in answer_lines(result, settings.top):
         print(line)
     if np.any(result.misfit.is_rare):
@@ -118,7 +127,9 @@ def infer(settings: RecordedSettings) -> int:
     unreachable = int(np.sum(~inference.reachable))
     for line in diagnosis_lines(diagnose(model), space.names, unreachable, len(demonstrations)):
         print(line)
+    begin("drawing the map")
     folder = _save(settings, demonstrations, problems, result, ranking)
+    begin("")
     print(f"written: {folder}")
     print(f"page: {folder / 'page.html'}")
     return FAILED if problems else DONE

@@ -17,6 +17,7 @@ from hydra.core.hydra_config import HydraConfig
 from experiments.app import DONE, STOPPED, run_command
 from experiments.collate.finished import CollateError
 from experiments.config.read import ConfigError
+from experiments.point.no_answer import NoAnswer
 from experiments.sweep.planner import SweepFailed
 from experiments.sweep.plugins import register_plugins
 from experiments.sweep.worker import run_single
@@ -28,7 +29,7 @@ def main() -> int:
     """Run the command line's point or sweep; returns the exit status."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a clean stop, as after Ctrl-C
     register_plugins()
-    status = run_command("config", _run_single, failures=(SweepFailed, CollateError))
+    status = run_command("config", _run_single, failures=(SweepFailed, CollateError, NoAnswer))
     if status == STOPPED:
         print("stopped; what has finished is kept: the same command runs the rest", file=sys.stderr)
     return status

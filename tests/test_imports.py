@@ -63,10 +63,14 @@ MLCI = {
 MATHEMATICS = "numpy scipy pandas pyarrow joblib pint openpyxl ezc3d"
 
 # A room of the framework, and all that it may import of this project.
-TRACKING, POINT = "experiments.tracking", "mlci experiments.config experiments.tracking"
+TRACKING, POINT = (
+    "experiments.tracking",
+    ("mlci experiments.config experiments.tracking experiments.progress"),
+)
 EVERYTHING = " ".join(PACKAGES)
 ROOMS = {
-    TRACKING: "",
+    "experiments.progress": "",
+    TRACKING: "experiments.progress",
     "experiments.config.paths": TRACKING,
     "experiments.config.suggestions": "",
     "experiments.config": f"mlci {TRACKING} experiments.terminal",

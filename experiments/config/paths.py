@@ -17,7 +17,7 @@ CHECKOUT = environment.CHECKOUT
 CONF = _CODE / "conf" if CHECKOUT is None else CHECKOUT / "conf"
 
 
-class _HasResults(Protocol):
+class HasResults(Protocol):
     """Settings that may name a folder of results."""
 
     @property
@@ -36,6 +36,6 @@ def default_results() -> Path:
     return home / "results"
 
 
-def results_folder(settings: _HasResults) -> Path:
+def results_folder(settings: HasResults) -> Path:
     """Where results go: the usual folder unless the settings name another."""
     return default_results() if settings.results is None else Path(settings.results).resolve()

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import fields
+from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, TypeVar
 
 from omegaconf import DictConfig, OmegaConf
@@ -20,6 +22,7 @@ from experiments.config.number_checks import (
     size_problems,
     study_problems,
 )
+from experiments.config.paths import HasResults, results_folder
 from experiments.config.problems import ConfigError, checked
 from experiments.config.settings import (
     AdviceSettings,
@@ -47,6 +50,7 @@ __all__ = [
     "read_config",
     "read_recorded_config",
     "settings_of_record",
+    "writable_results",
 ]
 
 _Part = TypeVar("_Part", Settings, StudySettings)
@@ -109,6 +113,24 @@ def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
     _refuse(advice_shape_problems(settings))
     _refuse(budget_problems(settings))
     return settings
+
+
+def writable_results(settings: HasResults) -> Path:
+    """The folder of results, made if need be, in which a file could be written just now.
+
+    Raises:
+        ConfigError: nothing can be written there, which is best known before hours of work.
+    """
+    folder = results_folder(settings)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        raise ConfigError(
+            f"results: nothing can be written into {folder} ({error.strerror}); name a folder of "
+            "your own: results=FOLDER"
+        ) from None
 
 
 def plain_tree(config: DictConfig) -> dict[str, Any]:

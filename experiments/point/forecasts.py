@@ -20,6 +20,7 @@ import mlci.demonstrator
 from experiments.config.settings import RecordedSettings, Settings
 from experiments.point.stages import model_inputs, system_module, tabular_model
 from experiments.point.trials import nominal_skill
+from experiments.progress import begin
 from experiments.tracking.store import Store
 from mlci.calibration import Calibration, calibrate, calibrate_on
 from mlci.demonstrations import Demonstration
@@ -99,6 +100,7 @@ def recorded_calibration(
     )
 
     def compute() -> dict[str, np.ndarray]:
+        begin(f"simulating {TRIALS} tasks like these to calibrate the evidence, once for them")
         return _arrays(
             calibrate(model, tasks, trials=TRIALS, exact_ends=exact_ends, crossing=crossing)
         )

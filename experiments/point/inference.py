@@ -8,6 +8,7 @@ import numpy as np
 
 from experiments.config.settings import ESTIMATE, Settings
 from experiments.point.forecasts import forecast_calibration
+from experiments.point.no_answer import NoAnswer, why_none
 from experiments.point.stages import tabular_model
 from experiments.point.trials import TrialSet, demonstrations
 from experiments.tracking.store import Store
@@ -57,15 +58,21 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
     """Run the demonstrator and rank the hypotheses.
 
     Raises:
-        RuntimeError: no trial is a demonstration.
+        NoAnswer: no trial is a demonstration.
     """
     trials = demonstrations(settings, store)
     numbers = trials.kept(settings.demonstrations.keep)
     if not len(numbers):
-        outcomes = ", ".join(f"{count} {outcome}" for outcome, count in trials.counts().items())
-        raise RuntimeError(
-            f"no demonstration was kept ({outcomes}): widen tasks, or allow more "
-            "demonstrations.iterations, restarts or goal_weight"
+        why = why_none(
+            trials.outcome,
+            trials.states,
+            trials.miss,
+            settings.model.space,
+            settings.demonstrations.goal_tolerance,
+        )
+        raise NoAnswer(
+            f"no demonstration was kept: {why}; narrow tasks, or allow "
+            "more demonstrations.iterations, restarts or goal_weight, or horizon"
         )
     model = tabular_model(settings, store)
     paths = tuple(

@@ -12,6 +12,7 @@ from experiments.console import answer_lines, diagnosis_lines, measure_lines, tr
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
 from experiments.point.tables import point_tables
+from experiments.progress import begin
 from experiments.terminal import entry
 from experiments.tracking.store import Store
 
@@ -29,10 +30,12 @@ def run_point(
     Returns:
         Tables by name, see `experiments.point.tables.point_tables`.
     """
+    begin("ranking hypotheses")
     inferred = infer_point(settings, store)
     inference, space, top = inferred.inference, settings.model.space, settings.ranks.top
     result = point_answer(settings, inferred)
     covered = np.flatnonzero(inference.hypotheses.inside(settings.constraint)).tolist()
+    begin("")
     for line in answer_lines(result, top, covered):
         log(line)
     if inferred.calibration is not None:
@@ -44,8 +47,10 @@ def run_point(
         inferred.diagnosis, space.names, inferred.unreachable, len(inferred.numbers)
     ):
         log(line)
+    begin("measuring")
     measures = measure_point(settings, inferred)
     tables = point_tables(settings, inferred, measures, result.misfit)
+    begin("")
     for line in measure_lines(tables["summary"].iloc[0], tables["ranks"], top):
         log(line)
     return tables

@@ -17,6 +17,7 @@ import mlci.demonstrator
 import mlci.effort
 import mlci.safety_filter
 from experiments.config.settings import Settings
+from experiments.point.no_answer import NoAnswer
 from experiments.point.stages import corners, safe_set, system_module
 from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
@@ -209,7 +210,7 @@ def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Tr
     """The trials that the demonstrator tries.
 
     Raises:
-        RuntimeError: too few tasks cross the truth, where only those are wanted.
+        NoAnswer: too few tasks cross the truth, where only those are wanted.
     """
     system, demonstrator = settings.real_model, settings.demonstrations
     draw = partial(
@@ -235,7 +236,7 @@ def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Tr
         trials += crossing(system, drawn, settings.constraint, **_skill(settings))
         if len(trials) >= demonstrator.pairs:
             return trials[: demonstrator.pairs]
-    raise RuntimeError(
+    raise NoAnswer(
         f"of {_MOST_BATCHES * demonstrator.pairs} tasks only {len(trials)} would enter the truth "
         "if it were not there: widen truth.boxes or tasks, or set tasks.crossing=false"
     )

@@ -16,6 +16,7 @@ from filelock import Timeout
 
 import experiments.point.run
 from experiments.config.settings import Settings
+from experiments.point.no_answer import NoAnswer
 from experiments.sweep.crash_trace import crash_trace, take_crash_trace
 from experiments.sweep.record import write_failure, write_note, write_result
 from experiments.tracking.environment import reset_peak_memory
@@ -126,7 +127,7 @@ def _attempt(point: Point, settings: Settings, log: Callable[[str], None] | None
         tables = _compute(point, settings, store, log)
         write_result(point, settings, tables, store, note)
     except Exception as error:
-        write_failure(point, "raised", _describe(error), traceback.format_exc(), number)
+        write_failure(point, "raised", _describe(error), _trace(error), number)
         raise
     (point.folder / "attempt.json").unlink()
 
@@ -148,14 +149,21 @@ def _compute(
 
         try:
             return experiments.point.run.run_point(settings, store, write_line)
-        except Exception:
-            file.write(traceback.format_exc())
+        except Exception as error:
+            file.write(_trace(error) or f"{error}\n")
             raise
 
 
 def _describe(error: Exception) -> str:
-    """Type and message of an error, on one line."""
+    """Type and message of an error, on one line; the message alone where it says all."""
+    if isinstance(error, NoAnswer):
+        return str(error)
     return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def _trace(error: Exception) -> str:
+    """Where an error was raised; empty where its message says all."""
+    return "" if isinstance(error, NoAnswer) else traceback.format_exc()
 
 
 @contextmanager

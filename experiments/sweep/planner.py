@@ -15,7 +15,7 @@ from tqdm import tqdm
 from experiments.collate.join import collate
 from experiments.config.explain import explain
 from experiments.config.paths import results_folder
-from experiments.config.read import ConfigError, plain_tree
+from experiments.config.read import ConfigError, plain_tree, writable_results
 from experiments.config.settings import StudySettings
 from experiments.sweep.combinations import Combinations
 from experiments.sweep.messages import describe_failures, describe_problems
@@ -62,6 +62,8 @@ class Planner(Sweeper):
         plan, study = self._plan(jobs)
         options, folder = study.sweep, results_folder(study) / study.study
         selection = select_points(plan, options)
+        if not options.dry_run:
+            writable_results(study)
         print(f"{len(plan)} points: {count_states(plan)}; {len(selection)} to run", flush=True)
         if len(plan) < len(jobs):
             print(f"{len(jobs) - len(plan)} of {len(jobs)} combinations repeat others")

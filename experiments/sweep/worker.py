@@ -6,7 +6,8 @@ from typing import Any
 
 from omegaconf import DictConfig
 
-from experiments.config.read import ConfigError, plain_tree
+from experiments.config.read import ConfigError, plain_tree, writable_results
+from experiments.progress import steps_shown
 from experiments.sweep import attempt
 from experiments.sweep.plan import read_point
 from experiments.tracking.points import State
@@ -14,6 +15,7 @@ from experiments.tracking.points import State
 _SWEEP_ONLY = ("only", "limit", "time_limit", "retries", "fail_fast", "mix_sources")
 
 
+@steps_shown()
 def run_single(tree: dict[str, Any]) -> None:
     """Run the point of a resolved config, unless it is finished; prints its log either way.
 
@@ -30,6 +32,7 @@ def run_single(tree: dict[str, Any]) -> None:
         print((point.folder / "log.txt").read_text(), end="")
         print(f"finished before: {point.folder}")
     else:
+        writable_results(study)
         if point.is_running():
             print(f"another process runs this point, and is waited for: {point.folder}")
         attempt.run_here(point, settings, print, force=study.sweep.force)

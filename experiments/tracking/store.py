@@ -21,6 +21,7 @@ import numpy as np
 from filelock import FileLock
 from numpy.typing import NDArray
 
+from experiments.progress import begin
 from experiments.tracking.files import digest, replace_file
 from experiments.tracking.sources import source_hash
 from experiments.tracking.trees import canonical_json, plain
@@ -78,6 +79,7 @@ class Store:
             with FileLock(folder / f"{key}.lock"):
                 arrays = _read_entry(folder, key)
                 if arrays is None:
+                    begin(f"computing {stage.replace('_', ' ')}, which later runs share")
                     arrays = dict(compute())
                     _write_entry(folder, key, arrays, made_from)
         return Stored(key, arrays)

@@ -17,6 +17,7 @@ from tiny_point import computed, hopeless, planned
 
 import experiments.point.run
 from experiments.config.settings import Settings
+from experiments.point.no_answer import NoAnswer
 from experiments.sweep import attempt, record
 from experiments.tracking.points import Point, State
 
@@ -62,13 +63,24 @@ def test_state_follows_a_point(point: Point, settings: Settings) -> None:
     assert point.record()["source"] == point.source
     assert point.record()["attempt"] == 2
     wrong = planned(hopeless(settings), point.results)
-    with pytest.raises(RuntimeError, match="no demonstration was kept") as caught:
+    with pytest.raises(NoAnswer, match="no demonstration was kept") as caught:
         computed(hopeless(settings), point.results)
     assert wrong.state() is State.FAILED
     failure = wrong.failure()
     assert (failure["reason"], failure["attempt"]) == ("raised", 1)
-    assert failure["error"] == f"RuntimeError: {caught.value}"
+    assert (failure["error"], failure["traceback"]) == (str(caught.value), "")
+
+
+def test_an_error_keeps_its_traceback(settings: Settings, tmp_path: Path) -> None:
+    (tmp_path / "store").write_text("not a folder")
+    point = planned(settings, tmp_path)
+    with pytest.raises(OSError, match="store"):
+        computed(settings, tmp_path)
+    failure = point.failure()
+    assert failure["reason"] == "raised"
+    assert failure["error"].partition(":")[0] in ("FileExistsError", "NotADirectoryError")
     assert "in run_point" in failure["traceback"]
+    assert (point.folder / "log.txt").read_text().startswith("Traceback")
 
 
 def test_point_runs_as_long_as_its_holder_lives(point: Point, settings: Settings) -> None:

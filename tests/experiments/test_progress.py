@@ -1,0 +1,44 @@
+"""The step that a command is at: on a terminal alone, and gone when something is printed."""
+
+from __future__ import annotations
+
+import io
+import logging
+
+import pytest
+
+from experiments.progress import begin, steps_shown
+
+
+class Terminal(io.StringIO):
+    """What a terminal is given to show."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@steps_shown()
+def work() -> None:
+    begin("reading")
+    begin("ranking")
+    begin("")
+    assert logging.getLogger("experiments.progress").handlers
+
+
+def test_steps_are_shown_one_after_the_other_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    work()
+    shown = [line.strip() for line in terminal.getvalue().split("\r")]
+    texts = [line.partition("[")[0].strip() for line in shown if line]
+    assert [text for text in texts if text] == ["reading", "ranking"]
+    assert shown[-1] == ""  # the line is free again
+    assert not logging.getLogger("experiments.progress").handlers
+
+
+def test_nothing_is_shown_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = io.StringIO()
+    monkeypatch.setattr("sys.stderr", file)
+    with steps_shown():
+        begin("reading")
+    assert file.getvalue() == ""
