@@ -57,8 +57,8 @@ def programs() -> dict[str, str]:
     found = {name: shutil.which(name) or "" for name in PACKAGES}
     if not all(found.values()):
         sys.exit(
-            f"the page is tested in a browser; {' and '.join(missing)} cannot be installed here: as "
-            f"root on Debian, apt-get install {' '.join(PACKAGES.values())}"
+            f"the page is tested in a browser; {' and '.join(missing)} cannot be installed here: "
+            f"as root on Debian, apt-get install {' '.join(PACKAGES.values())}"
         )
     return found
 
