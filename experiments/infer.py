@@ -226,7 +226,7 @@ def _save(
     title = f"What was avoided: {_source(settings)}"
     unused = [f"not used: {problem}" for problem in problems]
     content = page(result, demonstrations, title=title, doubtful=unused)
-    replace_file(folder / "page.html", content.encode())
+    replace_file(folder / "page.html", content.encode(errors="backslashreplace"))
     record = {
         **made_from,
         "demonstrations": settings.demonstrations,

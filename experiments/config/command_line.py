@@ -10,6 +10,8 @@ from pathlib import Path
 from experiments.config.paths import CONF, is_inside_checkout
 from experiments.config.problems import ConfigError
 
+PATHS = ("demonstrations", "results")  # keys whose values are paths
+
 
 def command_words(words: Sequence[str]) -> list[str]:
     """A command line for Hydra, that finds the configs in `conf` of the current folder too.
@@ -19,7 +21,10 @@ def command_words(words: Sequence[str]) -> list[str]:
             subject, whose file is composed last, would silently overrule another word.
     """
     # Hydra wants -m before, or after, all overrides.
-    ordered = [quote_options(w) for w in sorted(words, key=lambda w: w not in ("-m", "--multirun"))]
+    ordered = [
+        quote_path(quote_options(w))
+        for w in sorted(words, key=lambda w: w not in ("-m", "--multirun"))
+    ]
     own = Path.cwd() / "conf"
     named = any(word.partition("=")[0] in ("--config-dir", "-cd") for word in words)
     given = {word.partition("=")[0]: word for word in words}
@@ -41,6 +46,20 @@ def command_words(words: Sequence[str]) -> list[str]:
             name = path.relative_to(own).with_suffix("")
             raise ConfigError(f"{path}: mlci comes with a {name} of its own; rename this file")
     return [*ordered, f"--config-dir={own}"]
+
+
+def quote_path(argument: str) -> str:
+    """demonstrations=rec (1) as demonstrations='rec (1)': a path is text, without a grammar.
+
+    A list of paths, what is quoted, and an interpolation stay as they are.
+    """
+    key, _, value = argument.partition("=")
+    as_it_is = re.match(r"""null$|["']|\[.*\]$|\$\{""", value, re.DOTALL)
+    if key not in PATHS or not value or as_it_is:
+        return argument
+    # Hydra's grammar: before a quote, or at the end, backslashes are doubled.
+    escaped = re.sub(r"(\\*)'", r"\1\1\\'", value)
+    return f"{key}='" + re.sub(r"(\\+)$", r"\1\1", escaped) + "'"
 
 
 def quote_options(argument: str) -> str:

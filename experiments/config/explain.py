@@ -17,6 +17,7 @@ from hydra.errors import (
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from experiments.config.command_line import PATHS
 from experiments.config.paths import CONF
 from experiments.config.problems import ConfigError, field_keys
 from experiments.config.settings import RunSettings
@@ -39,7 +40,10 @@ def explain(error: BaseException) -> str:
         known = f"; there are {', '.join(options)}" if options else ""
         return f"{group or 'config'}: there is no {name}{known}"
     if isinstance(error, OverrideParseException):
-        return f"{_short(error.override)}: cannot be read as key=value ({_first_line(error)})"
+        words, (key, _, value) = _short(error.override), error.override.partition("=")
+        example = f"{key}=['{value.strip('[]')}']"
+        hint = f'; quote each path, as in "{example}"' if key in PATHS else ""
+        return f"{words}: cannot be read as key=value ({_first_line(error)}){hint}"
     if isinstance(error, InstantiationException) and error.__cause__:
         key = str(error).rpartition("full_key: ")[2]  # of the sweeper or the launcher
         return f"{key}: {_first_line(error.__cause__)}"

@@ -19,7 +19,7 @@ import pandas as pd
 from mlci.recordings.table import Table, Unusable, Wants
 
 _DELIMITERS = ("\t", ";", "|", ",")
-_SPACES = r"\s+"
+SPACES = r"\s+"
 _SEEN = 50  # lines by which delimiter and decimal sign are known
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -121,7 +121,7 @@ def table_of_lines(
 
 def split(line: str, delimiter: str) -> list[str]:
     """The entries of a line."""
-    if delimiter == _SPACES:
+    if delimiter == SPACES:
         return line.split()
     if '"' not in line:
         return line.split(delimiter)
@@ -132,7 +132,7 @@ def _of_width(
     line: str, delimiter: str, width: int, number: int, rows: Sequence[int], named: bool
 ) -> str:
     """A line that must have so many entries; one delimiter may follow the last."""
-    if delimiter == _SPACES:
+    if delimiter == SPACES:
         count = len(line.split())
         line = line.strip()
     else:
@@ -148,7 +148,7 @@ def _of_width(
 def _delimiter(lines: Sequence[str]) -> str:
     """What cuts most of these lines into the same number of entries, at least two."""
     best, score = ",", 0.0
-    for delimiter in (*_DELIMITERS, _SPACES):
+    for delimiter in (*_DELIMITERS, SPACES):
         counts = [len(split(line, delimiter)) for line in lines]
         usual = max(set(counts), key=counts.count)
         share = counts.count(usual) / len(lines)

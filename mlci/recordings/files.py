@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mlci.recordings import delimited, npz, parquet
+from mlci.recordings import c3d, delimited, excel, json_text, matlab, npz, opensim, parquet
 from mlci.recordings.recording import Remark, shown_path
 from mlci.recordings.table import Table, Unusable, Wants
 
@@ -34,6 +34,13 @@ FORMATS = {
     ".txt": _TEXT,
     ".npz": Format(npz.read),
     ".parquet": Format(parquet.read),
+    ".json": Format(json_text.read, 40),
+    ".mat": Format(matlab.read),
+    ".xlsx": Format(excel.read),
+    ".mot": Format(opensim.read_motion, 10),
+    ".sto": Format(opensim.read_motion, 10),
+    ".trc": Format(opensim.read_markers, 10),
+    ".c3d": Format(c3d.read, 4),
 }
 
 
@@ -53,7 +60,7 @@ def find_files(paths: Sequence[str | Path]) -> tuple[list[Path], list[Remark]]:
             problems.append(Remark(shown_path(path), f"cannot be looked into ({error})"))
             continue
         if not inside:
-            empty = f"holds no {' or '.join(FORMATS)} file"
+            empty = f"holds no file of {', '.join(FORMATS)}"
             message = empty if path.is_dir() else "there is no such file"
             problems.append(Remark(shown_path(path), message))
         found.update(dict.fromkeys(sorted(inside)))

@@ -46,7 +46,7 @@ def to_recording(table: Table, system: System, layout: Layout) -> Recording:
     headers = [str(name) for name in table.columns.columns]
     places, beside = _state_places(headers, space, layout), _places_beside(headers, system, layout)
     time, notes = _time_place(headers, layout), list[str]()
-    used = {*places.values(), *beside.values()}
+    used = {*places.values(), *beside.values(), time}
     others = [header for i, header in enumerate(headers) if i not in used and header.strip()]
     _refuse_missing(table, [*others, *table.others], places, time, space, layout)
     if time is None:
@@ -145,11 +145,12 @@ def _refuse_missing(
         return
     names = [*map(str, table.columns.columns), *table.others]
     example = f"columns={{{missing[-1]}: {others[0] if others else 'its name there'}}}"
+    array = f" (or columns={{{STATES}: NAME}} for an array of all)" if len(missing) > 1 else ""
     without = f"; without time, time_unit={SAMPLES}" if missing == ["time"] else ""
     raise ValueError(
         f"has no column {' or '.join(missing)} in its header ({shortened(names)}): it needs "
         f"{', '.join(['time', *space.names])}; if they have other names there, say so, as in "
-        f"{example}{without}"
+        f"{example}{array}{without}"
     )
 
 

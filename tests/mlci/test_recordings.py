@@ -287,7 +287,7 @@ def test_paths_that_stand_for_nothing_twice_the_same_or_alike(tmp_path):
     assert [str(item).split(": ")[1] for item in problems] == [
         "there is no such file",
         "there is no such file",
-        f"holds no {' or '.join(FORMATS)} file",
+        f"holds no file of {', '.join(FORMATS)}",
     ]
     assert "cannot read '.pdf' files" in problem_with(tmp_path / "a.pdf", GOOD)
 

@@ -59,6 +59,9 @@ Seed = Annotated[int, Field(strict=True, ge=0, lt=2**32)]
 
 Flag = Annotated[bool, Field(strict=True)]
 Word = Annotated[str, Field(strict=True)]
+PathWord = Annotated[
+    Word, BeforeValidator(lambda value: str(value) if type(value) is int else value)
+]
 
 
 def one_or_list(one: Any, several: Any) -> Any:

@@ -13,6 +13,7 @@ from experiments.config.settings.kinds import (
     Flag,
     NotNegative,
     Number,
+    PathWord,
     Positive,
     Word,
     about,
@@ -49,7 +50,7 @@ class RecordedSettings(ModelSettings):
     """What experiments/infer.py takes."""
 
     demonstrations: Annotated[
-        one_or_list(Word, tuple[Word, ...]),  # type: ignore[valid-type]
+        one_or_list(PathWord, tuple[PathWord, ...]),  # type: ignore[valid-type]
         about("a folder, a glob pattern or a file, or a list of them"),
     ]
     recorded_dt: Annotated[
