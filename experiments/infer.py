@@ -34,6 +34,7 @@ from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.store import Store
 from experiments.tracking.trees import canonical_json, plain
 from mlci.answers import Answer, answer
+from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
 from mlci.inference import Inference
@@ -67,7 +68,8 @@ def infer(settings: RecordedSettings) -> int:
     """Rank the hypotheses, print the result and save it; returns the exit status."""
     space = settings.model.space
     begin("reading files")
-    demonstrations, problems, notes = _read(settings)
+    readings = _read(settings)
+    demonstrations, problems, notes = readings
     begin("")
     for problem in problems:
         print(f"not used: {problem}", file=sys.stderr)
@@ -125,10 +127,14 @@ def infer(settings: RecordedSettings) -> int:
     for line in _refutation_lines(inference):
         print(line)
     unreachable = int(np.sum(~inference.reachable))
-    for line in diagnosis_lines(diagnose(model), space.names, unreachable, len(demonstrations)):
+    diagnosis, count = diagnose(model), len(demonstrations)
+    for line in diagnosis_lines(diagnosis, space.names, unreachable, count):
         print(line)
     begin("drawing the map")
     folder = _save(settings, demonstrations, problems, result, ranking)
+    concerns = list(diagnosis.concerns(space.names, unreachable, count))
+    content = _page(settings, readings, result, calibration, concerns)
+    replace_file(folder / "page.html", content)
     begin("")
     print(f"written: {folder}")
     print(f"page: {folder / 'page.html'}")
@@ -223,10 +229,6 @@ def _save(
         replace_file(folder / f"{name}.csv", csv_bytes(table))
     save(hypothesis_map.draw(ranking, paths, dimension_table(space)), folder / "map")
     replace_file(folder / "answer.json", _json_bytes(result.record()))
-    title = f"What was avoided: {_source(settings)}"
-    unused = [f"not used: {problem}" for problem in problems]
-    content = page(result, demonstrations, title=title, doubtful=unused)
-    replace_file(folder / "page.html", content.encode(errors="backslashreplace"))
     record = {
         **made_from,
         "demonstrations": settings.demonstrations,
@@ -237,12 +239,26 @@ def _save(
     return folder
 
 
-def _source(settings: RecordedSettings) -> str:
-    """What demonstrations were read from, as far as its name tells."""
+def _page(
+    settings: RecordedSettings,
+    readings: Readings,
+    result: Answer,
+    calibration: Calibration | None,
+    concerns: Sequence[str],
+) -> bytes:
+    """The page, with what reading the files assumed and all that is doubtful."""
     given = settings.demonstrations
-    return ", ".join(
-        Path(each).name or each for each in ([given] if isinstance(given, str) else given)
-    )
+    sources = [Path(each).name or each for each in ([given] if isinstance(given, str) else given)]
+    return page(
+        result,
+        readings.demonstrations,
+        title=f"What was avoided: {', '.join(sources)}",
+        assumed=[
+            *_together(readings.notes),
+            *([] if calibration is None else [calibration.summary()]),
+        ],
+        doubtful=[*concerns, *(f"not used: {problem}" for problem in readings.problems)],
+    ).encode(errors="backslashreplace")
 
 
 def _json_bytes(tree: dict[str, Any]) -> bytes:

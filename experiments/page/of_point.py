@@ -35,11 +35,15 @@ def point_page(facts: Facts) -> str:
         raise ArchiveError(f"{identity}: the source has changed since it ran; run it again first")
     settings = settings_of_record(facts.record["config"])
     inferred = infer_point(settings, Store(facts.point.results / "store"))
+    calibration, names = inferred.calibration, settings.model.space.names
+    concerns = inferred.diagnosis.concerns(names, inferred.unreachable, len(inferred.numbers))
     return page(
         point_answer(settings, inferred),
         inferred.demonstrations,
         title=f"Point {identity[:_SHORT]}: what simulated demonstrators avoided",
         about=_about(settings, inferred.inference),
+        assumed=[] if calibration is None else [calibration.summary()],
+        doubtful=list(concerns),
         truth=settings.constraint,
     )
 
