@@ -1,9 +1,15 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
-# The studies that the report needs, and all others; the experiment `smoke` repeats the paper's.
-STUDIES := paper telescope sensitivity in_cell calibration readings control_noise rule_breaking wrong_model
+# The studies that the report needs, the longest first, and all others; the experiment `smoke` repeats
+# the paper's.
+STUDIES := telescope paper sensitivity readings calibration rule_breaking wrong_model \
+	control_noise in_cell
 OTHERS := $(filter-out $(STUDIES) smoke,$(basename $(notdir $(wildcard conf/experiment/*.yaml))))
+
+# Two studies run at a time, each on half of the cores: while one plans its points, waits for what they
+# share or writes its tables, the other computes.
+HALF := $(shell echo $$(( ($$(getconf _NPROCESSORS_ONLN) + 1) / 2 )))
 
 .PHONY: help paper studies figures report smoke test stress lint benchmark lock
 
@@ -11,11 +17,12 @@ help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 paper: $(READY) ## run what is missing of the report's studies, draw their figures, write the report
-	@set -e; for each in $(STUDIES); do \
-		echo "=== study $$each"; \
-		$(BIN)/python experiments/run.py -m experiment=$$each; \
-	done
+	@$(MAKE) --no-print-directory --keep-going --jobs=2 $(STUDIES:%=study-%)
 	@$(MAKE) --no-print-directory figures
+
+study-%: $(READY)
+	@bash -o pipefail -c '$(BIN)/python experiments/run.py -m experiment=$* workers=$(HALF) 2>&1 \
+		| (trap "" INT; awk "{ print \"$*: \" \$$0; fflush() }")'
 
 studies: $(READY) ## run what is missing of all other studies, and draw their figures
 	@set -e; for each in $(OTHERS); do \

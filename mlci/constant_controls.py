@@ -116,7 +116,7 @@ def escape_value(
     steps = step_count(horizon, step)
     sliding, parts = _Sliding(system), [np.empty(0)]
     for first in range(0, len(states), _AT_ONCE):
-        part = states[first : first + _AT_ONCE]
+        part = np.asfortranarray(states[first : first + _AT_ONCE])
         order = _promising(sliding, constraints, part, horizon * _LOOK_AHEAD)
         best = np.full(len(part), -np.inf)
         for controls in system.control_box.vertices()[order]:
@@ -169,7 +169,8 @@ def _improve(
     counts = _counted(constraints)
     distance = constraints.signed_distance(states)
     row = np.flatnonzero(best < distance)
-    now, control, distance, least = states[row], controls[row], distance[row], distance[row]
+    now, control = np.asfortranarray(states[row]), np.asfortranarray(controls[row])
+    distance, least = distance[row], distance[row]
     rates = system.rates(now, control)
     for k in range(steps):
         then = system.clip(rk4_step(system, now, control, step))
@@ -184,8 +185,8 @@ def _improve(
             moves, counted = np.any(rates != 0, axis=1), least > best[row]
             best[row[counted & ~moves]] = least[counted & ~moves]
             go = counted & moves
-            row, now, control, least = row[go], now[go], control[go], least[go]
-            distance, rates = distance[go], rates[go]
+            row, least, distance = row[go], least[go], distance[go]
+            now, control, rates = (np.asfortranarray(each[go]) for each in (now, control, rates))
     best[row] = np.maximum(best[row], least)
 
 

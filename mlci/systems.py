@@ -112,8 +112,7 @@ class FunctionSystem(System):
 
     def dynamics(self, states: Floats, controls: Floats) -> Floats:
         batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
-        rates = [np.broadcast_to(rate, batch) for rate in self.rates(states, controls)]
-        return np.stack(rates, axis=-1)
+        return _stacked(batch, self.rates(states, controls))
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,9 +153,8 @@ class Pendulum(System):
 
     def dynamics(self, states: Floats, controls: Floats) -> Floats:
         passive = self.gravity / self.length * np.sin(states[..., 0]) - self.drag * states[..., 1]
-        push = controls[..., 0] / self.mass
-        speed, acceleration = np.broadcast_arrays(states[..., 1], passive + push)
-        return np.stack([speed, acceleration], axis=-1)
+        acceleration = passive + controls[..., 0] / self.mass
+        return _stacked(acceleration.shape, [states[..., 1], acceleration])
 
     def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
         batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
@@ -230,8 +228,8 @@ class TelescopingPendulum(System):
 
     def dynamics(self, states: Floats, controls: Floats) -> Floats:
         fall = self.gravity / states[..., 2] * np.sin(states[..., 0])
-        rates = states[..., 1], fall + controls[..., 0], states[..., 3], controls[..., 1]
-        return np.stack(np.broadcast_arrays(*rates), axis=-1)
+        swing = fall + controls[..., 0]
+        return _stacked(swing.shape, [states[..., 1], swing, states[..., 3], controls[..., 1]])
 
     def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
         batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
@@ -273,14 +271,22 @@ class DoubleIntegrator(System):
         return Box(np.array([-self.control_limit]), np.array([self.control_limit]))
 
     def dynamics(self, states: Floats, controls: Floats) -> Floats:
-        speed, acceleration = np.broadcast_arrays(states[..., 1], controls[..., 0])
-        return np.stack([speed, acceleration], axis=-1)
+        batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
+        return _stacked(batch, [states[..., 1], controls[..., 0]])
 
     def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
         batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
         by_state = np.broadcast_to(np.array([[0.0, 1.0], [0.0, 0.0]]), (*batch, 2, 2))
         by_control = np.broadcast_to(np.array([[0.0], [1.0]]), (*batch, 2, 1))
         return by_state, by_control
+
+
+def _stacked(batch: tuple[int, ...], rates: Sequence[ArrayLike]) -> Floats:
+    """Rates (*batch, n) of n dimensions, each contiguous: numpy is slow along so short an axis."""
+    rows = np.empty((len(rates), *batch))
+    for d, rate in enumerate(rates):
+        rows[d] = rate
+    return np.moveaxis(rows, 0, -1)
 
 
 def _require_positive(system: System, *names: str) -> None:

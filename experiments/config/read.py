@@ -49,6 +49,7 @@ __all__ = [
     "read_advice_config",
     "read_config",
     "read_recorded_config",
+    "resolved_tree",
     "settings_of_record",
     "writable_results",
 ]
@@ -141,8 +142,17 @@ def plain_tree(config: DictConfig) -> dict[str, Any]:
     """
     tree: Any = OmegaConf.to_container(config)
     tree.pop("hydra", None)
+    return resolved_tree(OmegaConf.create(tree))
+
+
+def resolved_tree(config: DictConfig) -> dict[str, Any]:
+    """A config without Hydra's own part as resolved dicts and lists.
+
+    Raises:
+        ConfigError: an interpolation that leads nowhere.
+    """
     try:
-        resolved: Any = OmegaConf.to_container(OmegaConf.create(tree), resolve=True)
+        resolved: Any = OmegaConf.to_container(config, resolve=True)
     except OmegaConfBaseException as error:
         raise ConfigError(f"{error.full_key}: {str(error).splitlines()[0]}") from None
     return dict(resolved)

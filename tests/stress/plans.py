@@ -1,5 +1,7 @@
 """Every study of conf/experiment, planned at full size: each combination is a point, and another.
 
+The config of each point is the one that Hydra itself composes.
+
 Run by `make stress`; ends with an error at the first study whose plan is not as it must be.
 """
 
@@ -15,9 +17,17 @@ TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS.parent), str(TESTS)]
 
 from commands import run_here
+from hydra import initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.types import RunMode
 
 from experiments import run
+from experiments.app import version_base
 from experiments.config.paths import CONF
+from experiments.config.read import plain_tree
+from experiments.sweep.combinations import Combinations
+from experiments.sweep.composer import Composer
 
 
 def main() -> None:
@@ -31,7 +41,22 @@ def main() -> None:
         assert re.fullmatch(r"(\d+) points: \1 missing; \1 to run", first), f"{path}: {first}"
         assert "repeat others" not in done.stdout, f"{path}: {others[0]}"
         assert "stand for all of" not in done.stdout or path.stem == "smoke", f"{path}: {others}"
+        compare_with_hydra(path.stem)
         print(f"{path.stem}: {first}", flush=True)
+
+
+def compare_with_hydra(study: str) -> None:
+    """Compose every point of a study in both ways."""
+    with initialize_config_dir(str(CONF), **version_base()):
+        loader = GlobalHydra.instance().config_loader()
+        words = [f"experiment={study}"]
+        base = loader.load_configuration("config", words, RunMode.MULTIRUN)
+        swept = {key: base.hydra.sweeper.get(key) for key in ("params", "settings", "cases")}
+        composer = Composer(loader, base)
+        parser = OverridesParser.create(config_loader=loader)
+        for job in Combinations(**swept).overrides(words, parser):
+            ours, theirs = composer.tree(job), plain_tree(loader.load_sweep_config(base, job))
+            assert ours == theirs, f"{study}: {job}"
 
 
 if __name__ == "__main__":

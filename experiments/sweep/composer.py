@@ -1,0 +1,64 @@
+"""The configs of a sweep's points: each choice of groups is composed once.
+
+Hydra reads every file anew for every point. But values that a point sets itself are put over what
+its groups compose to; so points which differ in values alone share all that comes before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+from hydra.core.config_loader import ConfigLoader
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override, OverrideType
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from experiments.config.read import plain_tree, resolved_tree
+
+
+class Composer:
+    """Composes points as Hydra's own loader does, from the config that the sweep began with."""
+
+    def __init__(self, loader: ConfigLoader, base: DictConfig) -> None:
+        self._loader, self._base = loader, base
+        self._parser = OverridesParser.create(config_loader=loader)
+        self._parsed = cache(self._parser.parse_override)
+        self._is_group = cache(lambda key: bool(loader.get_group_options(key)))
+        self._chosen = cache(self._compose)
+
+    def tree(self, job: Sequence[str]) -> dict[str, Any]:
+        """The resolved config of the point that some overrides make, without Hydra's own part.
+
+        Raises:
+            ConfigError: an interpolation that leads nowhere.
+            HydraException: overrides that Hydra refuses.
+        """
+        overrides = [self._parsed(word) for word in job]
+        values = [override for override in overrides if self._sets_a_value(override)]
+        choices = [word for word, each in zip(job, overrides, strict=True) if each not in values]
+        config = OmegaConf.create(self._chosen(tuple(choices)), flags={"struct": True})
+        try:
+            for override in values:
+                OmegaConf.update(config, override.key_or_group, override.value(), merge=True)
+        except OmegaConfBaseException:  # Hydra says better what is wrong
+            return plain_tree(self._loader.load_sweep_config(self._base, list(job)))
+        return resolved_tree(config)
+
+    def _sets_a_value(self, override: Override) -> bool:
+        """Whether an override changes a value that is there once the groups are composed."""
+        key = override.key_or_group
+        return (
+            override.type is OverrideType.CHANGE
+            and override.package is None
+            and not override.is_hydra_override()
+            and not self._is_group(key)
+        )
+
+    def _compose(self, choices: tuple[str, ...]) -> dict[str, Any]:
+        """What Hydra composes, not resolved yet, without its own part."""
+        config: Any = OmegaConf.to_container(self._loader.load_sweep_config(self._base, [*choices]))
+        config.pop("hydra")
+        return dict(config)
