@@ -30,6 +30,8 @@ from mlci.tabular import TabularModel
 # Probabilities are counted between these; most hypotheses are unlikely, so the first are narrow.
 EDGES = (0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
 _DECIMALS = 9  # of a probability that is put into a bin: what differs beyond is rounding
+COLUMNS = ["source", "prior", "sets", "set", "demonstrations", "belief", "bin", "count"]
+COLUMNS += ["predicted", "hits"]
 _DRAWS = 1000  # of a task until one can be solved
 
 
@@ -71,7 +73,7 @@ def belief_counts(settings: Settings, point: PointInference) -> pd.DataFrame:
                         rows.append(
                             {**opening, "demonstrations": count, "belief": belief, **counted}
                         )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def _beliefs(inference: Inference, truth: Bools) -> Iterator[tuple[str, Floats, Bools]]:

@@ -201,6 +201,18 @@ def test_point_writes_the_table_when_asked(tmp_path: Path) -> None:
     assert "calibration" not in run_point(settings, Store(tmp_path), lambda line: None)
 
 
+def test_a_world_without_a_set_has_no_rows_but_all_columns(
+    worlds: pd.DataFrame, tmp_path: Path
+) -> None:
+    settings = tiny("truth=none")
+    settings = dataclasses.replace(
+        settings, calibration=dataclasses.replace(settings.calibration, sets=0)
+    )
+    nothing = counts(settings, Store(tmp_path))
+    assert nothing.empty
+    assert list(nothing.columns) == [name for name in worlds if name not in ("truth", "seed")]
+
+
 def test_model_that_solves_no_task_is_refused(tmp_path: Path) -> None:
     """In 0.5 s the mass gets from no cell to any other, and no task that is drawn stays in one."""
     stuck = ["horizon=0.5", "actions=1", "grid.shape=[3000,1]"]
