@@ -74,7 +74,7 @@ def draw(
         bar = figure.colorbar(cells, ax=axes, shrink=0.85, pad=0.02)
         ticks = top * np.array([0, 1 / 16, 1 / 4, 9 / 16, 1])
         bar.set_ticks(np.sqrt(ticks).tolist(), labels=[f"{tick:.2g}" for tick in ticks])
-        bar.set_label("likelihood gain $L_i$ [nat]")
+        bar.set_label("likelihood gain $L_i$, square-root scale [nat]")
         bar.outline.set_linewidth(0.5)
         _legend(figure, "covered_by_truth" in hypotheses, bool(unavoidable.any()))
     return figure

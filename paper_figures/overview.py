@@ -10,7 +10,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
 
 from paper_figures.plane import Plane, axis_label, centre, numbered, outline
 from paper_figures.rows import Unsuited, described, gain_in_words
@@ -76,7 +77,7 @@ def draw(
     if not len(visits):
         raise Unsuited("no demonstration of the example is feasible")
     plane = Plane.of(ranking, state)
-    figure, panels = new_figure(PAGE, 2.15, ncols=4)
+    figure, panels = new_figure(PAGE, 2.55, ncols=4)
     with plt.rc_context(RC):
         of_trial = paths[paths["demonstration"] == visits["trial"].iloc[0]]
         _draw_demonstrations(panels[0], paths, boxes, plane)
@@ -91,7 +92,8 @@ def draw(
             axes.set_ylabel("")
             axes.set_yticklabels([])
         _bar(figure, panels[2], chances, r"$\Phi_i$ of one trial", power=1)
-        _bar(figure, panels[3], gains, "gain $L_i$ [nat]", power=2)
+        _bar(figure, panels[3], gains, "gain $L_i$,\nsquare-root scale [nat]", power=2)
+        figure.legend(handles=_legend(), loc="outside lower center", ncols=4)
     return figure
 
 
@@ -131,6 +133,21 @@ def facts(
         "Uncertainty: none is drawn; this is one run.",
     ]
     return "\n".join(lines)
+
+
+def _legend() -> list[object]:
+    """What the lines and signs mean."""
+    sign = {"color": "black", "linestyle": "", "markersize": 3.5}
+    return [
+        Line2D([], [], color=DEMONSTRATION, linewidth=1.2, label="demonstration of the trial"),
+        Line2D([], [], color=PATH, linewidth=0.6, label="other demonstrations"),
+        Line2D([], [], color=TRUTH, linewidth=1.4, linestyle="--", label="true constraint"),
+        Patch(facecolor=VIOLATED, edgecolor=EDGE, linewidth=0.5, label="violated hypothesis"),
+        Line2D([], [], marker="o", label="start", **sign),
+        Line2D([], [], marker="s", label="goal", **sign),
+        Line2D([], [], color="black", linewidth=1.3, label="sampled moves"),
+        Line2D([], [], color=GUIDE, linewidth=0.5, label="possible moves"),
+    ]
 
 
 def _of_first(table: pd.DataFrame, example_regions: pd.DataFrame) -> pd.DataFrame:

@@ -15,6 +15,8 @@ from matplotlib.figure import Figure
 
 from experiments.tracking.files import replace_file
 
+matplotlib.rcdefaults()  # a user's own matplotlibrc, such as text.usetex, is for other figures
+
 COLUMN = 3.4  # width of a column [in]
 DPI = 200  # of PNGs
 PAGE = 7.0  # of two columns and what is between them [in]

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from paper_figures.style import COLUMN, GUIDE, OTHER_COLOURS, RC, new_figure
@@ -34,11 +35,20 @@ def draw(scale: pd.DataFrame) -> Figure:
     Args:
         scale: the table of that name: a row a system and size.
     """
-    figure, (left, right) = new_figure(COLUMN, 2.1, ncols=2)
+    figure, (left, right) = new_figure(COLUMN, 2.4, ncols=2)
     with plt.rc_context(RC):
         _draw_panel(left, scale, _TIMES, "processor time [s]")
         _draw_panel(right, scale, _MEMORY, "memory [MB]")
-        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        entries = [
+            *left.get_legend_handles_labels()[0],
+            Line2D([], [], color=OTHER_COLOURS[0], marker="^", label="peak memory"),
+            Line2D([], [], color=GUIDE, linestyle=":", linewidth=0.8, label="slope 1"),
+            Line2D([], [], color=GUIDE, linewidth=0.6, label=f"the paper's {PAPER_STATES} states"),
+        ]
+        if len(_systems(scale)) > 1:
+            dashed = {"linestyle": "--", "marker": "o", "markerfacecolor": "white"}
+            entries.append(Line2D([], [], color=OTHER_COLOURS[0], label="four angles", **dashed))
+        figure.legend(handles=entries, loc="outside lower center", ncols=2)
     return figure
 
 
@@ -51,8 +61,8 @@ def facts(scale: pd.DataFrame) -> str:
         "(left) and peak memory of the process (right).",
         f"{first['actions']} actions, {first['hypotheses']} hypotheses, {first['steps']} steps of "
         f"{first['dt']:g} s; one run a size, so the times have no intervals.",
-        "Filled: telescoping pendulum. Hollow: four angles that no bound stops, so that most "
-        "cells are active. Dotted: slope 1; line: the paper's 2500 states.",
+        "Filled, solid: telescoping pendulum. Hollow, dashed: four angles that no bound stops, so "
+        "that most cells are active. Dotted: slope 1; line: the paper's 2500 states.",
     ]
     for system, rows in _systems(scale):
         for row in rows.itertuples():

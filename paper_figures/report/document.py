@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from paper_figures.report import (
@@ -23,7 +24,7 @@ from paper_figures.report import (
     section_start_points,
     section_wrong_model,
 )
-from paper_figures.report.markdown import figure, table
+from paper_figures.report.markdown import contents, figure, table
 from paper_figures.report.study_tables import Missing, Results, absent
 from paper_figures.report.verdict import RULES, Claim
 
@@ -42,14 +43,45 @@ class Figure:
 # The claims in the paper's order, each with its figures.
 CLAIMS: tuple[tuple[Callable[[Results], Claim], tuple[Figure, ...]], ...] = (
     (claim_1.claim, ()),
-    (claim_2.claim, (Figure("paper", "final_state_error", "Compare the paper's Fig. 3."),)),
-    (claim_3.claim, (Figure("paper", "violation_distance", "Compare the paper's Fig. 4."),)),
-    (claim_4.claim, (Figure("paper", "rank_curve", "Compare the paper's Fig. 5."),)),
+    (
+        claim_2.claim,
+        (
+            Figure(
+                "paper",
+                "final_state_error",
+                "Final-state error; see the paper's Fig. 3.",
+            ),
+        ),
+    ),
+    (
+        claim_3.claim,
+        (
+            Figure(
+                "paper",
+                "violation_distance",
+                "Violation distance; see the paper's Fig. 4.",
+            ),
+        ),
+    ),
+    (
+        claim_4.claim,
+        (
+            Figure(
+                "paper",
+                "rank_curve",
+                "Rank of the truth; compare the paper's Fig. 5.",
+            ),
+        ),
+    ),
     (claim_5.claim, ()),
     (
         claim_6.claim,
         (
-            Figure("telescope", "success_pain", "Compare the paper's Fig. 7."),
+            Figure(
+                "telescope",
+                "success_pain",
+                "How often the telescoping pendulum's truth is found; compare the paper's Fig. 7.",
+            ),
             Figure(
                 "telescope",
                 "success_cases_pain",
@@ -134,20 +166,23 @@ state space, violation distances are numbers of regions, ranks start at 1, and d
 
 def report(results: Results) -> str:
     """The report of a folder of results."""
-    parts, claims = [], _claims(results)
+    parts: list[tuple[str, str]] = []
+    claims, numbers = _claims(results), itertools.count(1)
     for number, (claim, (_, figures)) in enumerate(zip(claims, CLAIMS, strict=True), start=1):
         if isinstance(claim, Missing):
-            parts.append(f"## Claim {number}\n\n{absent(claim)}")
+            parts.append((f"Claim {number}", absent(claim)))
         else:
-            text = f"{claim.markdown()}\n{_figures(results, figures)}"
-            parts.append(f"## Claim {number}: {claim.title}\n\n{text}")
+            text = f"{claim.markdown()}\n{_figures(results, figures, numbers)}"
+            parts.append((f"Claim {number}: {claim.title}", text))
     for heading, section, figures in SECTIONS:
         try:
-            text = f"{section(results)}\n{_figures(results, figures)}"
+            text = f"{section(results)}\n{_figures(results, figures, numbers)}"
         except Missing as missing:
             text = absent(missing)
-        parts.append(f"## {heading}\n\n{text}")
-    lines = [_INTRODUCTION, "## Verdicts\n", _verdicts(claims), RULES, *parts]
+        parts.append((heading, text))
+    verdicts = ("Verdicts", f"{_verdicts(claims)}\n{RULES}")
+    lines = [_INTRODUCTION, contents(heading for heading, _ in (verdicts, *parts))]
+    lines += [f"## {heading}\n\n{text}" for heading, text in (verdicts, *parts)]
     return "\n".join(line.rstrip("\n") + "\n" for line in lines)
 
 
@@ -176,15 +211,15 @@ def _verdicts(claims: Sequence[Claim | Missing]) -> str:
     )
 
 
-def _figures(results: Results, figures: tuple[Figure, ...]) -> str:
-    """Those figures that are drawn, with paths from the report's folder."""
+def _figures(results: Results, figures: tuple[Figure, ...], numbers: Iterator[int]) -> str:
+    """Those figures that are drawn, with the next numbers and paths from the report's folder."""
     lines = []
     for entry in figures:
         path = results.folder / entry.study / "figures" / f"{entry.name}.png"
         if path.is_file():
             inside = f"figures/{path.name}"
             relative = inside if entry.study == FOLDER else f"../{entry.study}/{inside}"
-            lines.append(figure(relative, entry.caption))
+            lines.append(figure(relative, next(numbers), entry.caption))
         else:
             lines.append(f"The figure `{entry.name}` is not drawn yet; `make figures` does it.\n")
     return "\n".join(lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
 import pandas as pd
@@ -56,6 +57,16 @@ def by_dt(rows: pd.DataFrame, column: str) -> str:
     )
 
 
-def figure(path: str, caption: str) -> str:
-    """A figure with its caption; the path is relative to the report."""
-    return f"![{caption}]({path})\n"
+def figure(path: str, number: int, caption: str) -> str:
+    """A figure with its number and caption; the path is relative to the report."""
+    return f"![Figure {number}]({path})\n\n*Figure {number}: {caption}*\n"
+
+
+def contents(headings: Iterable[str]) -> str:
+    """Links to headings, as a list."""
+    return "".join(f"- [{heading}](#{anchor(heading)})\n" for heading in headings)
+
+
+def anchor(heading: str) -> str:
+    """What a link to a heading names, as GitHub makes it from the heading."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")

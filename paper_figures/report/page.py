@@ -5,9 +5,12 @@ from __future__ import annotations
 import base64
 import mimetypes
 import re
+from html import unescape
 from pathlib import Path
 
 from markdown_it import MarkdownIt
+
+from paper_figures.report.markdown import anchor
 
 _STYLE = """
 body { max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #1a1a1a }
@@ -18,7 +21,9 @@ table { font-size: 0.85rem }
 th, td { border-bottom: 1px solid #ccc; padding: 0.25rem 0.6rem; vertical-align: top }
 thead th { border-bottom: 2px solid #666 }
 code { font-size: 0.9em; background: #f3f3f3; padding: 0 0.2em }
-img { max-width: 100%; display: block; margin: 1rem 0 }
+figure { margin: 1rem 0 }
+figcaption { font-size: 0.9rem; color: #444 }
+img { max-width: 100%; display: block }
 """
 
 
@@ -30,6 +35,12 @@ def html(markdown: str, folder: Path) -> str:
         folder: what the paths of its figures are relative to.
     """
     body = MarkdownIt("commonmark", {"html": False}).enable("table").render(markdown)
+    body = re.sub(r"<h2>(.*?)</h2>", _with_anchor, body)
+    body = re.sub(
+        r"<p>(<img [^>]+>)</p>\n<p><em>(Figure .*?)</em></p>",
+        r"<figure>\n\1\n<figcaption>\2</figcaption>\n</figure>",
+        body,
+    )
     body = re.sub(r'<img src="([^"]+)"', lambda match: _embedded(match[1], folder), body)
     title = markdown.partition("\n")[0].lstrip("# ")
     return (
@@ -37,6 +48,12 @@ def html(markdown: str, folder: Path) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
     )
+
+
+def _with_anchor(heading: re.Match[str]) -> str:
+    """A heading that links can name."""
+    text = unescape(re.sub(r"<[^>]+>", "", heading[1]))
+    return f'<h2 id="{anchor(text)}">{heading[1]}</h2>'
 
 
 def _embedded(path: str, folder: Path) -> str:

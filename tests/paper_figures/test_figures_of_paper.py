@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from types import ModuleType
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -124,34 +125,30 @@ def test_violation_distance_floor_and_pooled_have_panels(
     assert figure.axes[0].get_ylabel() == "distance [regions]"
 
 
-def test_rank_curves_are_the_medians_bands_and_shares_of_the_table(
+def test_rank_curves_are_the_medians_and_bands_of_the_table(
     drawn: Drawn, tables_for: TablesFor
 ) -> None:
     table = study_tables()["rank_curve"]
     wanted = table[(table["actions"] == 9) & (table["samples"] == 1)]
     figure = drawn(rank_curve)
     truths, dts = sorted(set(wanted["truth"])), sorted(set(wanted["dt"]))
-    grid = np.array(figure.axes).reshape(len(dts), 2 * len(truths))
+    grid = np.array(figure.axes).reshape(len(truths), len(dts))
     for (truth, dt), part in wanted.groupby(["truth", "dt"]):
-        left, right = grid[dts.index(dt), 2 * truths.index(truth) :][:2]
-        assert left.get_title(loc="left") == f"{truth.upper()}, $\\Delta t$ = {dt:g} s"
-        assert left.get_yscale() == "log"
-        assert (left.get_ylabel(), right.get_ylabel()) == ("rank of truth", "in top 5 [%]")
+        axes = grid[truths.index(truth), dts.index(dt)]
+        assert axes.get_title(loc="left") == f"{truth.upper()}, $\\Delta t$ = {dt:g} s"
+        assert axes.get_yscale() == "log"
         for place, (cells, rows) in enumerate(part.groupby("cells")):
-            sides = [
-                (left, rows["median"], rows["q25"], rows["q75"]),
-                (right, *(100 * rows[f"share_top_5{end}"] for end in ("", "_low", "_high"))),
-            ]
-            for axes, middle, low, high in sides:
-                curve = axes.lines[place]
-                np.testing.assert_allclose(curve.get_ydata(), middle)
-                np.testing.assert_allclose(curve.get_xdata(), rows["demonstrations"])
-                assert curve.get_marker() == CELL_MARKS[cells]
-                assert to_hex(curve.get_color()) == CELL_COLOURS[cells]
-                edges = axes.collections[place].get_paths()[0].vertices
-                for x, least, most in zip(rows["demonstrations"], low, high, strict=True):
-                    at = edges[edges[:, 0] == x, 1]
-                    assert (at.min(), at.max()) == pytest.approx((least, most))
+            curve = axes.lines[place]
+            np.testing.assert_allclose(curve.get_ydata(), rows["median"])
+            np.testing.assert_allclose(curve.get_xdata(), rows["demonstrations"])
+            assert curve.get_marker() == CELL_MARKS[cells]
+            assert to_hex(curve.get_color()) == CELL_COLOURS[cells]
+            edges = axes.collections[place].get_paths()[0].vertices
+            ends = zip(rows["demonstrations"], rows["q25"], rows["q75"], strict=True)
+            for x, least, most in ends:
+                at = edges[edges[:, 0] == x, 1]
+                assert (at.min(), at.max()) == pytest.approx((least, most))
+    assert {axes.get_ylabel() for axes in grid[:, 0]} == {"rank of truth"}
     assert {axes.get_xlabel() for axes in grid[-1]} == {"demonstrations"}
     said = f"{rank_curve.facts(table)}\n"
     at = min(9, wanted["demonstrations"].max())
@@ -162,6 +159,22 @@ def test_rank_curves_are_the_medians_bands_and_shares_of_the_table(
             f"{100 * row.share_top_5:.0f} % ({100 * row.share_top_5_low:.0f} to "
             f"{100 * row.share_top_5_high:.0f})\n"
         ) in said
+
+
+def test_rank_curves_have_at_most_ten_panels_and_name_the_time_steps_that_have_none(
+    drawn: Drawn, tables_for: TablesFor
+) -> None:
+    table = study_tables()["rank_curve"]
+    table = table[(table["actions"] == 9) & (table["samples"] == 1)]
+    one = table[table["dt"] == table["dt"].min()]
+    steps = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
+    many = pd.concat([one.assign(dt=dt) for dt in steps])
+    figure = rank_curve.draw(many)
+    plt.close(figure)
+    titles = [axes.get_title(loc="left").rpartition("= ")[2] for axes in figure.axes]
+    assert titles == 2 * ["0.1 s", "0.3 s", "0.4 s", "0.5 s", "0.7 s"]
+    assert "No panel has room for dt 0.2, 0.6 s." in rank_curve.facts(many)
+    assert "No panel" not in rank_curve.facts(table)
 
 
 def test_state_space_has_all_hypotheses_and_both_truths(
@@ -276,8 +289,11 @@ def test_overview_is_one_run_from_demonstrations_to_ranks(
     bars = [(bar.get_xlabel(), bar.get_xticklabels()) for bar in figure.axes[4:]]
     assert [(label, [tick.get_text() for tick in ticks]) for label, ticks in bars] == [
         ("$\\Phi_i$ of one trial", ["0", "0.5", "1"]),
-        ("gain $L_i$ [nat]", ["0", "1.5", "6"]),
+        ("gain $L_i$,\nsquare-root scale [nat]", ["0", "1.5", "6"]),
     ]
+    (legend,) = figure.legends
+    meanings = {"demonstration of the trial", "start", "goal", "true constraint"}
+    assert meanings < {text.get_text() for text in legend.get_texts()}
     (coloured,) = boxes(chances)
     np.testing.assert_allclose(coloured.get_array(), ranking["unconstrained"])
     np.testing.assert_allclose(extent(coloured), corners(ranking))
@@ -315,7 +331,7 @@ def test_hypothesis_map_shows_what_the_table_says(drawn: Drawn, tables_for: Tabl
     tables, figure = tables_for(hypothesis_map), drawn(hypothesis_map)
     ranking = tables["example_ranking"]
     axes, bar = figure.axes
-    assert bar.get_ylabel() == "likelihood gain $L_i$ [nat]"
+    assert bar.get_ylabel() == "likelihood gain $L_i$, square-root scale [nat]"
     np.testing.assert_allclose(bar.get_yticks() ** 2, [0, 6 / 16, 6 / 4, 6 * 9 / 16, 6])
     ticks = [float(text.get_text()) for text in bar.get_yticklabels()]
     np.testing.assert_allclose(ticks, bar.get_yticks() ** 2, rtol=0.05)

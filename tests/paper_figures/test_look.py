@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -14,6 +17,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from experiments.config.paths import CHECKOUT
 from paper_figures import hypothesis_map
 from paper_figures.drawing import FIGURES
 from paper_figures.style import CELL_COLOURS, CELL_MARKS, COLUMN, PAGE, save
@@ -96,3 +100,14 @@ def test_curves_differ_in_grey() -> None:
     # Two of them are close, and their marks tell them apart.
     assert luminance[-1] - luminance[0] > 0.25
     assert len(set(CELL_MARKS.values())) == len(CELL_MARKS)
+
+
+def test_a_users_own_matplotlibrc_changes_nothing(tmp_path: Path) -> None:
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nlines.linestyle: --\n")
+    code = (
+        "import paper_figures.style, matplotlib\n"
+        "assert matplotlib.rcParams['text.usetex'] is False\n"
+        "assert matplotlib.rcParams['lines.linestyle'] == '-'\n"
+    )
+    environment = {**os.environ, "MATPLOTLIBRC": str(tmp_path / "matplotlibrc")}
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=CHECKOUT, env=environment)

@@ -18,6 +18,9 @@ def test_the_figure_shows_the_table() -> None:
     left, right = time_and_memory.draw(scale_rows()).axes
     assert (left.get_ylabel(), right.get_ylabel()) == ("processor time [s]", "memory [MB]")
     table = scale_rows()
+    (legend,) = left.figure.legends
+    signs = {"slope 1", "the paper's 2500 states", "four angles"}
+    assert signs < {text.get_text() for text in legend.get_texts()}
     for axes, columns in ((left, ["discretise_s", "infer_s"]), (right, ["peak_mb"])):
         lines = [line for line in axes.lines if line.get_marker() != "None"]
         curves = [line.get_xydata() for line in lines]

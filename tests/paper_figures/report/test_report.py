@@ -22,6 +22,7 @@ from paper_figures.report import (
     claim_4,
     claim_5,
     claim_6,
+    markdown,
     page,
     section_beliefs,
     section_choices,
@@ -512,11 +513,17 @@ class Links(HTMLParser):
 
 def test_the_page_is_one_file_with_everything_in_it(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(b"\x89PNG")
-    text = "# Title\n\n| a | b |\n| --- | ---: |\n| x | 1 |\n\n![A caption.](a.png)\n\n<b>&\n"
+    text = (
+        f"# Title\n\n{markdown.contents(['Claim 1: a, b & c'])}\n## Claim 1: a, b & c\n\n"
+        f"| a | b |\n| --- | ---: |\n| x | 1 |\n\n"
+        f"{markdown.figure('a.png', 3, 'A caption.')}\n<b>&\n"
+    )
     parser = Links()
     content = page.html(text, tmp_path)
     parser.feed(content)
-    assert parser.found == ["data:image/png;base64,iVBORw=="]
+    assert parser.found == ["#claim-1-a-b--c", "data:image/png;base64,iVBORw=="]
+    assert '<h2 id="claim-1-a-b--c">' in content
+    assert "<figcaption>Figure 3: A caption.</figcaption>\n</figure>" in content
     assert {"table", "h1", "img", "title"} <= set(parser.tags)
     assert "b" not in parser.tags
     assert "<title>Title</title>" in content
