@@ -18,7 +18,7 @@ from typing import Any
 
 from experiments.config.paths import CHECKOUT, default_results
 from experiments.lookback.archive import Archive, ArchiveError, Facts
-from experiments.lookback.cleaning import clean
+from experiments.lookback.cleaning import clean, empty_trash
 from experiments.lookback.freshness import point_concerns
 from experiments.lookback.query import select
 from experiments.lookback.views import (
@@ -41,17 +41,18 @@ studies. The beginning of a point's identity is enough to name it."""
 _EXAMPLES = {
     "status": ("", "paper", "paper --results results/smoke"),
     "list": ("", "paper", "points --state failed --state stale"),
-    "show": ("paper", "000e5c", "000e5c --results results/smoke"),
-    "diff": ("000e5c 040cfa", "000e5 040c", "000e5c 040cfa --results results/smoke"),
-    "page": ("000e5c", "000e5c --out page.html", "000e5c --results results/smoke"),
+    "show": ("paper", "31402d", "31402d --results results/smoke"),
+    "diff": ("31402d 13390b", "3140 1339", "31402d 13390b --results results/smoke"),
+    "page": ("31402d", "31402d --out page.html", "31402d --results results/smoke"),
     "query": ("truth=c1 'dt<=0.5'", "cells=400 --study paper", "'final_state_error>1'"),
     "export": ("paper", "paper --out paper.csv", "paper --table ranks"),
     "demonstrations": (
-        "000e5c --out recorded",
-        "000e5c --out ~/recorded",
-        "000e5c --out /tmp/recorded",
+        "31402d --out recorded",
+        "31402d --out ~/recorded",
+        "31402d --out /tmp/recorded",
     ),
     "clean": ("", "--yes", "--results results/smoke"),
+    "empty-trash": ("", "--results results/smoke"),
 }
 
 
@@ -78,6 +79,9 @@ def main() -> int:
         return 2
     except BrokenPipeError:  # somebody has read enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
+        return 2
     return 0
 
 
@@ -130,7 +134,8 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("point", metavar="POINT")
     one.add_argument("--out", type=Path, metavar="FILE", help="default: page-POINT.html here")
     one = add("clean", _clean, "list what no study uses: points, stored stages, dead files")
-    one.add_argument("--yes", action="store_true", help="remove it")
+    one.add_argument("--yes", action="store_true", help="move it into the folder `trash`")
+    add("empty-trash", _empty_trash, "remove what clean --yes has moved into the folder `trash`")
     return parser
 
 
@@ -157,13 +162,13 @@ def _status(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
 def _show(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """All about a point or a study."""
     item = archive.find(options.name)
-    return study_facts(archive, item) if isinstance(item, Study) else point_facts(item)
+    return study_facts(archive, item) if isinstance(item, Study) else point_facts(archive, item)
 
 
 def _diff(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """What differs between two points."""
     one, two = (_point(archive, name) for name in (options.one, options.two))
-    return differences(one, two, _width())
+    return differences(archive, one, two, _width())
 
 
 def _query(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
@@ -219,8 +224,13 @@ def _page(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
 
 
 def _clean(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
-    """What no study uses; removed if told."""
+    """What no study uses; moved into the trash if told."""
     return clean(archive, remove=options.yes)
+
+
+def _empty_trash(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
+    """What was cleaned, removed for good."""
+    return empty_trash(archive.results)
 
 
 def _point(archive: Archive, name: str) -> Facts:

@@ -19,7 +19,11 @@ _STOPPED = 130  # the exit status after Ctrl-C
 
 
 def main() -> int:
-    """Run the command line; returns 1 if a study that it names makes no figure, else 0."""
+    """Run the command line.
+
+    Returns:
+        1 if a study that it names makes no figure, or tables are not as they were written; else 0.
+    """
     parser = argparse.ArgumentParser(prog="paper_figures", description=__doc__)
     parser.add_argument("study", nargs="*", metavar="STUDY")
     parser.add_argument("--results", type=Path, help="folder of results", metavar="DIR")
@@ -41,8 +45,9 @@ def main() -> int:
             print(f"drawn: {path}", flush=True)
         if not drawing.images:
             print(f"nothing to draw: {drawing}", flush=True)
-            is_complete = False
-    return 0 if is_complete or not options.study else 1
+            is_complete = is_complete and not options.study
+        is_complete = is_complete and not drawing.damage
+    return 0 if is_complete else 1
 
 
 def _job_count(text: str) -> int:

@@ -16,6 +16,8 @@ from joblib import Parallel, delayed
 
 from experiments.tracking.figure_notes import figure_note, read_note, sentence, write_note
 from experiments.tracking.files import replace_file
+from experiments.tracking.names import is_name
+from experiments.tracking.study_tables import TableError, read_tables
 from paper_figures import (
     calibration_diagram,
     choice_effects,
@@ -76,12 +78,14 @@ class Drawing:
         images: the PNG of each figure; a PDF and the caption's facts as text are beside it.
         notes: what is listed of each figure, by its name.
         reasons: for each module that drew nothing, why.
+        damage: which tables are not as they were written.
     """
 
     study: Path
     images: list[Path] = field(default_factory=list)
     notes: dict[str, dict[str, Any]] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
+    damage: list[str] = field(default_factory=list)
 
     def __str__(self) -> str:
         """Why there are no images."""
@@ -126,16 +130,18 @@ def _draw(study: Path, name: str) -> Drawing:
             drawing.notes[path.name] = figure_note(path, name, files)
     except Unsuited as reason:
         drawing.reasons[name] = str(reason)
+    except TableError as error:
+        drawing.reasons[name] = str(error)
+        drawing.damage.append(str(error))
     return drawing
 
 
 def _contents(study: Path, module: ModuleType) -> dict[str, bytes]:
     """The files of the tables that a module needs."""
-    paths = {name: study / "tables" / f"{name}.csv" for name in module.TABLES}
-    for name, path in paths.items():
-        if not path.is_file():
-            raise Unsuited(f"there is no table {name}")
-    return {name: path.read_bytes() for name, path in paths.items()}
+    try:
+        return read_tables(study, module.TABLES)
+    except FileNotFoundError as error:
+        raise Unsuited(f"there is no table {Path(error.filename).stem}") from None
 
 
 def _versions(
@@ -152,6 +158,8 @@ def _versions(
         return
     first = next(iter(tables.values()))
     for value in sorted(first[column].unique()):
+        if not is_name(str(value)):
+            raise Unsuited(f"{column} {value!r} cannot be part of a file's name")
         yield (
             f"_{value}",
             {
@@ -171,10 +179,11 @@ def _listed(study: Path, parts: Iterator[Drawing]) -> Drawing:
         whole.images += part.images
         whole.notes |= part.notes
         whole.reasons |= part.reasons
+        whole.damage += [text for text in part.damage if text not in whole.damage]
     for name, reason in whole.reasons.items():
         old = {figure: note for figure, note in before.items() if note["module"] == name}
         whole.notes = old | whole.notes
-        if old:
+        if old or reason in whole.damage:
             print(f"{study.name}: not drawn again: {name}: {reason}")
     if whole.images:
         write_note(study, whole.notes)

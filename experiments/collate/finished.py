@@ -12,7 +12,7 @@ from typing import Any
 
 import pandas as pd
 
-from experiments.tracking.files import digest
+from experiments.tracking.files import digest, read_file
 from experiments.tracking.points import Point
 from experiments.tracking.trees import flatten
 
@@ -82,7 +82,7 @@ class FinishedPoint:
         written = self.table_digest(name)
         if not written or not path.exists():
             raise CollateError(f"point {self.identity} has no table {path.name}: {path}")
-        data = path.read_bytes()
+        data = read_file(path)
         if digest(data) != written:
             raise CollateError(f"{path} is not as its point wrote it; run the sweep again")
         return data

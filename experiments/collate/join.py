@@ -7,8 +7,8 @@ Beside them stand the tables that are made of these: intervals, reliability, exa
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,8 @@ from experiments.collate.examples import example_tables
 from experiments.collate.finished import CollateError, FinishedPoint
 from experiments.collate.intervals import study_tables
 from experiments.collate.reliability import reliability
-from experiments.tracking.files import csv_bytes, digest, replacing
+from experiments.tracking.files import csv_bytes, digest, exchange_folders, part_of, replacing
+from experiments.tracking.names import inner_path
 from experiments.tracking.points import Point
 from experiments.tracking.study import Study, collated, whole_study, write_collated
 from experiments.tracking.tables import rounded
@@ -55,18 +56,23 @@ def collate(
     if not mixed:
         _refuse_mixture(finished)
     study = whole_study(folder)
+    tables = inner_path(folder.parent, folder.name, "tables")
+    new = part_of(tables)  # a folder, which takes the place of the old one once all are whole
     digests: dict[str, str] = {}
-    with ExitStack() as files:  # no table takes its place unless all are whole
+    try:
         joined: dict[str, Path] = {}
         for name in sorted({name for point in finished for name in point.tables}):
-            parts = joined_parts(name, finished)
-            joined[name], digests[f"{name}.csv"] = _write(folder, name, parts, files)
+            joined[name] = new / f"{name}.csv"
+            digests[joined[name].name] = _write(joined[name], joined_parts(name, finished))
         for name, frame in _made_tables(finished, joined, study, log).items():
-            _, digests[f"{name}.csv"] = _write(folder, name, [csv_bytes(rounded(frame))], files)
-    _remove_former(study, digests, folder)
-    records = {point.identity: point.record for point in finished}
-    write_collated(folder, collated(records, digests))
-    return [folder / "tables" / name for name in sorted(digests)]
+            digests[f"{name}.csv"] = _write(new / f"{name}.csv", [csv_bytes(rounded(frame))])
+        former = set(study.collated.tables) if study and study.collated else set()
+        _publish(new, tables, former)
+        records = {point.identity: point.record for point in finished}
+        write_collated(folder, collated(records, digests))
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+    return [tables / name for name in sorted(digests)]
 
 
 def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
@@ -126,21 +132,29 @@ def _made_tables(
     return made if cases is None else {**made, "cases": cases}
 
 
-def _write(folder: Path, name: str, parts: Iterable[bytes], files: ExitStack) -> tuple[Path, str]:
-    """Write a table that takes its place when `files` close; where it is until then, its digest."""
-    file = files.enter_context(replacing(folder / "tables" / f"{name}.csv"))
-    for part in parts:
-        file.write(part)
-    file.flush()
-    path = Path(file.name)
-    return path, digest(path.read_bytes())
+def _write(path: Path, parts: Iterable[bytes]) -> str:
+    """Write a table; returns its digest."""
+    with replacing(path) as file:
+        for part in parts:
+            file.write(part)
+        file.flush()
+        return digest(Path(file.name).read_bytes())
 
 
-def _remove_former(study: Study | None, tables: Iterable[str], folder: Path) -> None:
-    """Remove the tables that the study listed before and does not have any more."""
-    former = study.collated.tables if study and study.collated else ()
-    for name in set(former).difference(tables):
-        (folder / "tables" / name).unlink(missing_ok=True)
+def _publish(new: Path, tables: Path, former: set[str]) -> None:
+    """Let a folder of new tables and that of the old ones change names.
+
+    What lies among the old ones and is nobody's table, such as a file of a user's, is kept.
+
+    Args:
+        new: where the new tables are; afterwards the old ones.
+        tables: where a study's tables are.
+        former: the tables that the study listed before.
+    """
+    exchange_folders(new, tables)
+    for path in new.iterdir() if new.exists() else ():
+        if path.name not in former and not (tables / path.name).exists():
+            path.rename(tables / path.name)
 
 
 def _refuse_mixture(points: Sequence[FinishedPoint]) -> None:

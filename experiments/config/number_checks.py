@@ -14,14 +14,15 @@ from experiments.config.memory import expected_memory, machine_memory
 from experiments.config.settings import AdviceSettings, ModelSettings, Settings, StudySettings
 
 _MOST_STEPS = 100_000
-_TAKEN = ("points", "store", "diffs", "inference")  # among the folders of results
+_TAKEN = ("points", "store", "diffs", "inference", "trash")  # among the folders of results
 
 
 def study_problems(study: StudySettings) -> Iterator[str]:
     """A name that cannot be a folder's, and options that exclude each other."""
-    if not re.fullmatch(r"[A-Za-z0-9_-]+", study.study) or study.study in _TAKEN:
+    name = study.study
+    if name is not None and (not re.fullmatch(r"[A-Za-z0-9_-]+", name) or name in _TAKEN):
         yield (
-            f"study: {study.study!r} cannot name a folder of results; use letters, digits, - and _ "
+            f"study: {name!r} cannot name a folder of results; use letters, digits, - and _ "
             f"({', '.join(_TAKEN)} are taken)"
         )
     sweep = study.sweep

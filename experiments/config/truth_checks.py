@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from experiments.config.settings import NO_TRUTH, Settings
+from experiments.tracking.names import is_name
 from mlci.grids import Grid
 from mlci.spaces import Box
 from mlci.system_check import check_affine
@@ -21,6 +22,11 @@ _MOST_VALUES = 100_000_000  # of a safe set's grid: about 1 GB for each of its a
 def truth_problems(settings: Settings) -> Iterator[str]:
     """A truth that is given twice or not at all, and what needs a truth, or none."""
     truth, calibration = settings.truth, settings.calibration
+    if not is_name(truth.name):
+        yield (
+            f"truth.name: {truth.name!r} cannot be part of a file's name; use letters, digits, "
+            "- and _"
+        )
     if settings.tasks.crossing and truth.name == NO_TRUTH:
         yield "tasks.crossing: true, but no truth is there to cross; set it to false"
     if settings.demonstrations.rule_breaking and truth.name == NO_TRUTH:

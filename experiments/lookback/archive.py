@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import io
+import os
 import re
 from collections import Counter
 from collections.abc import Iterable
@@ -14,9 +16,14 @@ from typing import Any
 import yaml
 
 from experiments.config.suggestions import did_you_mean
+from experiments.tracking.files import read_file
+from experiments.tracking.names import is_identity
 from experiments.tracking.points import Point, State
 from experiments.tracking.study import Study, StudyError, read_study
+from experiments.tracking.study_tables import table_changes
 from experiments.tracking.trees import flatten
+
+KINDS = ("points", "store", "diffs", "inference", "trash")  # folders of results but studies
 
 
 class ArchiveError(Exception):
@@ -29,9 +36,11 @@ class Facts:
 
     Attributes:
         point: the point.
+        is_shipped: whether its values are in a study's tables, which came without its folder.
     """
 
     point: Point
+    is_shipped: bool = False
 
     @cached_property
     def record(self) -> dict[str, Any]:
@@ -40,8 +49,23 @@ class Facts:
 
     @cached_property
     def state(self) -> State:
-        """Its state when it was first asked for."""
-        return self.point.state()
+        """Its state when it was first asked for; missing if it cannot be read."""
+        if self.is_shipped:
+            return State.SHIPPED
+        try:
+            return self.point.state()
+        except OSError:
+            return State.MISSING
+
+    @cached_property
+    def damage(self) -> str | None:
+        """Why its record does not count, although there is one."""
+        if self.is_shipped:
+            return None
+        try:
+            return self.point.damage()
+        except OSError as error:
+            return f"{error.filename}: {error.strerror}"
 
     @cached_property
     def config(self) -> dict[str, Any]:
@@ -53,8 +77,8 @@ class Facts:
         """The row of its summary table, opened by its columns; empty unless it finished."""
         if "summary.csv" not in self.record.get("files", {}):
             return {}
-        with (self.point.folder / "summary.csv").open(newline="") as file:
-            row = next(csv.DictReader(file), {})
+        text = read_file(self.point.folder / "summary.csv").decode()
+        row = next(csv.DictReader(io.StringIO(text)), {})
         return {key: value_of(text) for key, text in row.items()}
 
 
@@ -72,14 +96,14 @@ class Archive:
     def _listings(self) -> dict[str, Study | StudyError]:
         """Every study by its name, or why it cannot be read."""
         listings: dict[str, Study | StudyError] = {}
-        for path in sorted(self.results.glob("*/study.json")):
+        for folder in self._folders:
             try:
-                study = read_study(path.parent)
+                study = read_study(folder)
             except StudyError as error:
-                listings[path.parent.name] = error
+                listings[folder.name] = error
             else:
                 if study is not None:
-                    listings[path.parent.name] = study
+                    listings[folder.name] = study
         return listings
 
     @property
@@ -89,18 +113,56 @@ class Archive:
 
     @property
     def unreadable(self) -> list[str]:
-        """Why the other studies cannot be read."""
-        return [str(it) for it in self._listings.values() if isinstance(it, StudyError)]
+        """What cannot be read, and why: studies, points, folders."""
+        studies = [str(it) for it in self._listings.values() if isinstance(it, StudyError)]
+        return [*studies, *self._inside[1], *self._points_inside[1]]
+
+    @property
+    def without_listing(self) -> list[Path]:
+        """Folders of results that hold something and are neither studies nor known otherwise."""
+        others = [folder for folder in self._folders if folder.name not in self._listings]
+        return [folder for folder in others if not _is_known(folder)]
+
+    @property
+    def _folders(self) -> list[Path]:
+        return self._inside[0]
+
+    @cached_property
+    def _inside(self) -> tuple[list[Path], list[str]]:
+        """The folders in that of results, and what cannot be read there."""
+        return _inner_folders(self.results)
+
+    @cached_property
+    def _points_inside(self) -> tuple[list[Path], list[str]]:
+        """The folders of points, and what is none."""
+        if not any(folder.name == "points" for folder in self._folders):
+            return [], []
+        folders, problems = _inner_folders(self.results / "points")
+        strange = [f"{it}: is no point" for it in folders if not is_identity(it.name)]
+        return [it for it in folders if is_identity(it.name)], problems + strange
 
     @cached_property
     def points(self) -> dict[str, Facts]:
         """Every point with a folder, by its identity."""
-        folders = sorted(self.results.glob("points/*/"))
+        folders = self._points_inside[0]
         return {folder.name: Facts(Point(self.results, folder.name)) for folder in folders}
+
+    @cached_property
+    def _shipped(self) -> frozenset[str]:
+        """Points that studies have tables of, as they were written, and no folder."""
+        points: set[str] = set()
+        for study in self.studies.values():
+            if study.collated and not points.issuperset(study.collated.points):
+                changes = table_changes(study)
+                is_there = len(changes.missing) < len(study.collated.tables)
+                if is_there and not changes.damaged:
+                    points.update(study.collated.points)
+        return frozenset(points.difference(self.points))
 
     def point(self, identity: str) -> Facts:
         """A point by its identity, whether it has a folder or not."""
-        return self.points.get(identity) or Facts(Point(self.results, identity))
+        known = self.points.get(identity)
+        return known or Facts(Point(self.results, identity), identity in self._shipped)
 
     def points_of(self, study: Study) -> list[Facts]:
         """The points of a study, in the order of its plan."""
@@ -141,6 +203,30 @@ class Archive:
         if not isinstance(study, Study):
             raise ArchiveError(f"{name}: no such study{did_you_mean(name, self._listings)}")
         return study
+
+
+def _inner_folders(folder: Path) -> tuple[list[Path], list[str]]:
+    """The folders in a folder, by name, and what cannot be read there; links are not followed."""
+    folders, problems = [], []
+    try:
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                if entry.is_symlink():
+                    problems.append(f"{entry.path}: is a link, which is not followed")
+                elif entry.is_dir() and not entry.name.startswith("."):
+                    folders.append(Path(entry.path))
+    except FileNotFoundError:
+        return [], []
+    except OSError as error:
+        problems.append(f"{folder}: {error.strerror}")
+    return sorted(folders), sorted(problems)
+
+
+def _is_known(folder: Path) -> bool:
+    """Whether a folder of results that is no study uses no point: empty, or of a known kind."""
+    if folder.name in KINDS or (folder / "points").is_dir():  # results in results
+        return True
+    return not any(folder.iterdir())
 
 
 def count_states(points: Iterable[Facts]) -> Counter[State]:

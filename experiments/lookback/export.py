@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from experiments.lookback.archive import ArchiveError, Facts
-from experiments.tracking.files import csv_bytes
+from experiments.tracking.files import csv_bytes, read_file
 
 
 def tidy_table(points: Sequence[Facts], measure: str) -> pd.DataFrame:
@@ -24,7 +24,7 @@ def tidy_table(points: Sequence[Facts], measure: str) -> pd.DataFrame:
         if name not in record["files"]:
             known = ", ".join(Path(file).stem for file in record["files"] if file.endswith(".csv"))
             raise ArchiveError(f"{measure}: no such table; there are {known}")
-        table = pd.read_csv(facts.point.folder / name)
+        table = pd.read_csv(io.BytesIO(read_file(facts.point.folder / name)))
         front: dict[str, object] = {
             "point": facts.point.identity,
             "state": str(facts.state),

@@ -1,4 +1,4 @@
-"""Whether the tables and figures of a study are those of its points, and if not, why."""
+"""Whether points, tables, figures and report are those of the code of now, and if not, why."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from experiments.lookback.archive import Facts, count_states
 from experiments.tracking import figure_notes
-from experiments.tracking.files import digest
-from experiments.tracking.points import State
-from experiments.tracking.study import Study
+from experiments.tracking.points import State, point_source
+from experiments.tracking.study import Study, table_source
+from experiments.tracking.study_tables import table_changes
 
 
 def point_concerns(points: Sequence[Facts]) -> list[str]:
@@ -22,32 +22,46 @@ def point_concerns(points: Sequence[Facts]) -> list[str]:
     ]
 
 
+def is_shipped(points: Sequence[Facts]) -> bool:
+    """Whether some of a study's points are not stored here, but in its tables."""
+    return any(point.state is State.SHIPPED for point in points)
+
+
+def shipped_concerns(study: Study, points: Sequence[Facts]) -> list[str]:
+    """Whether the code, or a package, of points that are not stored here is another one now."""
+    collated = study.collated
+    if collated is None or not is_shipped(points):
+        return []
+    if set(collated.sources) <= {point_source(module) for module in collated.systems}:
+        return []
+    return ["the code that computes points, or a package that it uses, has changed since"]
+
+
 def table_concerns(study: Study, points: Sequence[Facts]) -> list[str]:
     """Why the tables of a study are not up to date; empty if they are."""
     collated = study.collated
     if collated is None:
         return ["not written yet", *point_concerns(points)]
-    concerns = []
-    for name, written in collated.tables.items():
-        path = study.folder / "tables" / name
-        if not path.exists():
-            concerns.append(f"table {name} is missing")
-        elif digest(path.read_bytes()) != written:
-            concerns.append(f"table {name} was changed after it was written")
+    changes = table_changes(study)
+    concerns = list(changes.damaged)
+    if not is_shipped(points):  # the largest tables are not
+        concerns += [f"table {name} is missing" for name in changes.missing]
     if set(collated.points) != set(study.points):
         concerns.append("they hold other points than the study's last sweep")
-    elif all(point.record for point in points):
+    elif all(point.record for point in points) and points:
         sources = Counter(point.record["source"] for point in points)
         latest = max(point.record["started"] for point in points)
         if sources != collated.sources or latest > collated.started[1]:
             concerns.append("points have run again since")
     if len(collated.sources) > 1:
         concerns.append(f"they mix {len(collated.sources)} versions of the source")
-    return concerns + point_concerns(points)
+    if collated.points and collated.made_by != table_source():
+        concerns.append("the code that makes them of points, or a package, has changed since")
+    return concerns + shipped_concerns(study, points) + point_concerns(points)
 
 
 def figure_concerns(study: Study, points: Sequence[Facts]) -> dict[str, list[str]]:
     """Why each figure of a study is not up to date, by its name; empty for one that is."""
-    of_points = point_concerns(points)
+    of_points = shipped_concerns(study, points) + point_concerns(points)
     figures = figure_notes.concerns(study.folder)
     return {name: concerns + of_points for name, concerns in figures.items()}

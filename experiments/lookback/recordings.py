@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from experiments.lookback.archive import ArchiveError, Facts
+from experiments.tracking.files import read_file
 from experiments.tracking.store import Store
 from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.recordings.write import write_demonstration
@@ -40,7 +42,7 @@ def write_recordings(facts: Facts, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     space, dt = _space(facts), facts.config["demonstrations.dt"]
     files = []
-    for number in pd.read_csv(facts.point.folder / "trials.csv")["trial"]:
+    for number in pd.read_csv(io.BytesIO(read_file(facts.point.folder / "trials.csv")))["trial"]:
         goal = Box(trials["goal_lower"][number], trials["goal_upper"][number])
         task = Task(trials["starts"][number], goal, facts.config["horizon"])
         files.append(folder / f"trial_{number:03d}.csv")
@@ -52,6 +54,7 @@ def write_recordings(facts: Facts, folder: Path) -> list[Path]:
 
 def _space(facts: Facts) -> StateSpace:
     """The state space of a point."""
-    rows = pd.read_csv(facts.point.folder / "dimensions.csv", keep_default_na=False)
+    table = io.BytesIO(read_file(facts.point.folder / "dimensions.csv"))
+    rows = pd.read_csv(table, keep_default_na=False)
     bounds = Box(np.array(rows["lower"]), np.array(rows["upper"]))
     return StateSpace(bounds, np.array(rows["periodic"]), tuple(rows["name"]), tuple(rows["unit"]))

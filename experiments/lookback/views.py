@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from experiments.lookback.archive import Archive, Facts, count_states
-from experiments.lookback.freshness import figure_concerns, table_concerns
+from experiments.lookback.freshness import figure_concerns, is_shipped, table_concerns
 from experiments.lookback.query import varying
 from experiments.terminal import job_names, table_lines
+from experiments.tracking import report_note
+from experiments.tracking.figure_notes import note_damage
+from experiments.tracking.files import read_file
 from experiments.tracking.points import State
 from experiments.tracking.study import Study
 from experiments.tracking.trees import flatten
 
 _SHORT = 12  # characters of an identity that are shown; any that are enough can be typed
+_RUN = "python experiments/run.py"
+_OF_SWEEP = ("experiment=", "scale=", "study=", "subject=")  # overrides that a study's sweep needs
 _COLUMNS = ("truth", "cells", "actions", "dt", "samples", "seed")
 
 
@@ -85,27 +92,38 @@ def summary_list(points: Sequence[Facts], width: int | None) -> Iterator[str]:
 
 
 def study_status(archive: Archive, study: Study) -> Iterator[str]:
-    """A study's points by state, then what is up to date."""
+    """A study's points by state, then what is up to date, or shipped as it was made."""
     points = archive.points_of(study)
     counts = count_states(points)
     states = ", ".join(f"{counts[state]} {state}" for state in State if counts[state])
     yield f"{study.name}: {len(points)} points: {states or 'none'}"
-    yield f"  tables  {_freshness(table_concerns(study, points))}"
-    figures = figure_concerns(study, points)
+    for point in points:
+        if point.damage:
+            yield f"  point   {_short(point)} does not count: {point.damage}"
+    fresh = "shipped, unchanged" if is_shipped(points) else "up to date"
+    yield f"  tables  {_freshness(table_concerns(study, points), fresh)}"
+    figures, damage = figure_concerns(study, points), note_damage(study.folder)
     if not figures:
-        yield "  figures not drawn"
+        yield f"  figures {damage or 'not drawn'}"
     for name, concerns in figures.items():
-        yield f"  figure  {name}: {_freshness(concerns)}"
+        yield f"  figure  {name}: {_freshness(concerns, fresh)}"
+    report = report_note.concerns(study.folder)
+    if report is not None:
+        yield f"  report  {_freshness(report, fresh)}"
 
 
-def point_facts(facts: Facts) -> Iterator[str]:
+def point_facts(archive: Archive, facts: Facts) -> Iterator[str]:
     """State, config and record by dotted keys, then the log."""
     point, record = facts.point, facts.record
     yield f"point    {point.identity}"
     yield f"state    {facts.state}"
-    yield f"folder   {point.folder}"
+    yield f"folder   {point.results / 'points' / point.identity}"
     if facts.state is State.STALE:
         yield f"         source was {record['source'][:_SHORT]}, is {point.source[:_SHORT]}"
+    if facts.state is State.SHIPPED:
+        yield from _shipped_lines(facts, archive)
+    if facts.damage:
+        yield f"         its record does not count: {facts.damage}"
     if failure := point.failure():
         reasons = flatten({key: value for key, value in failure.items() if key != "traceback"})
         yield from ["", "failure", *_fact_lines(reasons)]
@@ -115,9 +133,22 @@ def point_facts(facts: Facts) -> Iterator[str]:
         yield from ["", "config", *_fact_lines(facts.config)]
         yield from ["", "record", *_fact_lines(flatten(rest))]
         yield from ["", "summary", *_fact_lines(facts.summary)]
-    log = point.folder / "log.txt"
-    if log.exists():
-        yield from ["", "log", *(f"  {line}" for line in log.read_text().splitlines())]
+    with suppress(OSError):
+        log = read_file(point.folder / "log.txt").decode(errors="replace")
+        yield from ["", "log", *(f"  {line}" for line in log.splitlines())]
+
+
+def _shipped_lines(facts: Facts, archive: Archive) -> Iterator[str]:
+    """What runs a point that is not stored here, and where its values are meanwhile."""
+    for study in archive.studies.values():
+        if facts.point.identity in study.points:
+            overrides = study.points[facts.point.identity]
+            if facts.state is State.SHIPPED:
+                yield f"         not stored here; tables of the study {study.name} have its values"
+            sweep = [each for each in overrides if each.startswith(_OF_SWEEP)]
+            is_sweep = any(each.startswith("experiment=") for each in sweep)
+            words = ["-m", *sweep] if is_sweep else overrides
+            yield f"         to run it: {_RUN} {shlex.join(words)}"
 
 
 def study_facts(archive: Archive, study: Study) -> Iterator[str]:
@@ -140,8 +171,14 @@ def study_facts(archive: Archive, study: Study) -> Iterator[str]:
         yield from _fact_lines({name: digest[:_SHORT] for name, digest in collated.tables.items()})
 
 
-def differences(one: Facts, two: Facts, width: int | None) -> Iterator[str]:
-    """Differing facts of two points, side by side."""
+def differences(archive: Archive, one: Facts, two: Facts, width: int | None) -> Iterator[str]:
+    """Differing facts of two points, side by side; of one that is not here, how to run it."""
+    for facts in (one, two):
+        if not facts.record:
+            yield f"{facts.point.identity}: {facts.state}, so there is nothing to compare"
+            yield from _shipped_lines(facts, archive)
+    if not (one.record and two.record):
+        return
     parts: list[tuple[str, Mapping[str, Any], Mapping[str, Any]]] = [
         ("config", one.config, two.config),
         ("versions and run", _comparable(one.record), _comparable(two.record)),
@@ -168,9 +205,9 @@ def _comparable(record: dict[str, Any]) -> dict[str, Any]:
     return flatten({key: value for key, value in record.items() if key not in result})
 
 
-def _freshness(concerns: Sequence[str]) -> str:
-    """Whether something is up to date, and why not."""
-    return f"not up to date: {'; '.join(concerns)}" if concerns else "up to date"
+def _freshness(concerns: Sequence[str], fresh: str) -> str:
+    """Whether something is up to date, or why not."""
+    return f"not up to date: {'; '.join(concerns)}" if concerns else fresh
 
 
 def _fact_lines(facts: Mapping[str, Any]) -> Iterator[str]:

@@ -18,9 +18,9 @@ import experiments.point.run
 from experiments.config.settings import Settings
 from experiments.point.no_answer import NoAnswer
 from experiments.sweep.crash_trace import crash_trace, take_crash_trace
-from experiments.sweep.record import write_failure, write_note, write_result
+from experiments.sweep.record import write_failure, write_result
 from experiments.tracking.environment import reset_peak_memory
-from experiments.tracking.files import PART
+from experiments.tracking.files import PART, growing
 from experiments.tracking.points import Point, State
 from experiments.tracking.store import Store
 
@@ -121,7 +121,7 @@ def _attempt(point: Point, settings: Settings, log: Callable[[str], None] | None
             (point.folder / name).unlink(missing_ok=True)
         for part in point.folder.glob(f".*{PART}"):  # of an attempt that was killed
             part.unlink()
-        write_note(point, "attempt", note)
+        point.write_note("attempt", note)
         reset_peak_memory()
         store = Store(point.results / "store")
         tables = _compute(point, settings, store, log)
@@ -137,7 +137,7 @@ def _compute(
 ) -> Mapping[str, pd.DataFrame]:
     """The point's tables; its lines, and its traceback, go to its log."""
     with (
-        open(point.folder / "log.txt", "w", buffering=1) as file,
+        growing(point.folder / "log.txt") as file,
         _output_to(file) if log is None else nullcontext(),
         store.timed("total"),
     ):

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import takewhile
 
+from experiments.tracking.files import growing, read_file
 from experiments.tracking.points import Point
 
 _FILE = "crash_trace.txt"
@@ -19,7 +20,7 @@ _LATE = "Timeout ("  # how faulthandler's own text begins at the time limit
 @contextmanager
 def crash_trace(point: Point, time_limit: float | None) -> Iterator[None]:
     """Have a crash, or the time limit [s], write where this process is before it ends."""
-    with open(point.folder / _FILE, "w") as file:
+    with growing(point.folder / _FILE) as file:
         faulthandler.enable(file)
         if time_limit is not None:
             faulthandler.dump_traceback_later(time_limit, exit=True, file=file)
@@ -46,7 +47,7 @@ def take_crash_trace(point: Point, function: str) -> tuple[str, bool]:
     """
     path = point.folder / _FILE
     try:
-        text = path.read_text(errors="replace")
+        text = read_file(path).decode(errors="replace")
         path.unlink()
     except OSError:
         return "", False

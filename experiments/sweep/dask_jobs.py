@@ -18,6 +18,7 @@ from tqdm import tqdm
 
 from experiments.config.read import ConfigError
 from experiments.sweep.cluster import ClusterLauncher, Share
+from experiments.tracking.files import growing, replace_file
 
 _LOCAL = {"processes": False, "n_workers": 1, "dashboard_address": None}
 
@@ -50,7 +51,7 @@ class DaskLauncher(ClusterLauncher):
             message = f"hydra.launcher.scheduler: {self.scheduler} does not answer: {error}"
             raise ConfigError(message) from None
         mark = folder / "running"
-        mark.touch()
+        replace_file(mark, b"")
         try:
             jobs = [
                 client.submit(_run_process, i, list(share.items()), mark, Path.cwd(), pure=False)
@@ -72,7 +73,7 @@ class DaskLauncher(ClusterLauncher):
 def _run_process(index: int, share: Sequence[object], mark: Path, folder: Path) -> None:
     """In a worker: run a share in a process of its own, which ends when the mark is gone."""
     order = {"parent": os.getpid(), "while_exists": str(mark), "share": share, "workers": 1}
-    with open(mark.parent / f"{index}.log", "a") as log:
+    with growing(mark.with_name(f"{index}.log")) as log:
         subprocess.run(
             [sys.executable, "-m", "experiments.sweep.cluster"],
             input=json.dumps(order).encode(),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -16,7 +18,7 @@ from experiments.collate.join import collate
 from experiments.config.explain import explain
 from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, writable_results
-from experiments.config.settings import StudySettings
+from experiments.config.settings import StudySettings, SweepSettings
 from experiments.sweep.combinations import Combinations
 from experiments.sweep.composer import Composer
 from experiments.sweep.messages import describe_failures, describe_problems
@@ -25,8 +27,10 @@ from experiments.sweep.pool import PoolLauncher
 from experiments.sweep.runner import run_points
 from experiments.sweep.worker import run_task
 from experiments.terminal import job_names
+from experiments.tracking.files import digest
+from experiments.tracking.locks import StudyInUse, plan_lock, publication_lock, sweep_lock
 from experiments.tracking.points import State
-from experiments.tracking.study import write_plan
+from experiments.tracking.study import whole_study, write_plan
 
 
 class SweepFailed(Exception):
@@ -61,7 +65,7 @@ class Planner(Sweeper):
         parser = OverridesParser.create(config_loader=self._loader)
         jobs = self._combinations.overrides(arguments, parser)
         plan, study = self._plan(jobs)
-        options, folder = study.sweep, results_folder(study) / study.study
+        options, folder = study.sweep, results_folder(study) / (study.study or _own_name(plan))
         selection = select_points(plan, options)
         if not options.dry_run:
             writable_results(study)
@@ -70,10 +74,23 @@ class Planner(Sweeper):
             print(f"{len(jobs) - len(plan)} of {len(jobs)} combinations repeat others")
         for note in self._combinations.notes:
             print(note, flush=True)
+        _refuse_replacement(plan, folder, options)
         if options.dry_run:
             _print_plan(plan, selection)
             return
-        write_plan(folder, [(each.point, each.job) for each in plan], study.examples)
+        try:
+            with sweep_lock(folder, [planned.point.identity for planned in plan]):
+                self._run(plan, folder, study)
+        except StudyInUse as error:
+            raise ConfigError(str(error)) from None
+
+    def _run(self, plan: Sequence[PlannedPoint], folder: Path, study: StudySettings) -> None:
+        """Run what is missing of a plan, and collate; errors as of `sweep`."""
+        options = study.sweep
+        with plan_lock(folder.parent):
+            write_plan(folder, [(each.point, each.job) for each in plan], study.examples)
+            plan = [_planned_again(planned) for planned in plan]
+        selection = select_points(plan, options)
         outcome = run_points(
             selection, lambda jobs: self._launcher.launch(jobs, initial_job_idx=0), options
         )
@@ -85,8 +102,9 @@ class Planner(Sweeper):
             print(f"{left} of {len(plan)} points are left, and no table is written")
             return
         points = [planned.point for planned in plan]
-        for table in collate(points, folder, mixed=options.mix_sources):
-            print(f"written: {table}")
+        with publication_lock(folder):
+            for table in collate(points, folder, mixed=options.mix_sources):
+                print(f"written: {table}")
 
     def _plan(self, jobs: Sequence[Sequence[str]]) -> tuple[list[PlannedPoint], StudySettings]:
         """Compose and check every point; of equal ones the first stays."""
@@ -111,6 +129,36 @@ class Planner(Sweeper):
             self._launcher.names = {planned.job: planned.name for planned in plan.values()}
             self._launcher.composed = trees
         return list(plan.values()), study
+
+
+def _own_name(plan: Sequence[PlannedPoint]) -> str:
+    """The name of a sweep that was given none: the same for the same points."""
+    identities = sorted(planned.point.identity for planned in plan)
+    return f"sweep_{digest(' '.join(identities).encode())[:8]}"
+
+
+def _refuse_replacement(plan: Sequence[PlannedPoint], folder: Path, options: SweepSettings) -> None:
+    """Raise if a study of that name has points that this sweep would leave out of it."""
+    before = whole_study(folder)
+    left_out = set(before.points if before else ()) - {each.point.identity for each in plan}
+    if before is None or not left_out or options.replace:
+        return
+    message = (
+        f"study: {folder.name} has {len(before.points)} points, and {len(left_out)} of them are "
+        "not in this sweep, whose tables would take the place of theirs; give it a name of its "
+        "own, study=..., or say sweep.replace=true"
+    )
+    if not options.dry_run:
+        raise ConfigError(message)
+    print(message)
+
+
+def _planned_again(planned: PlannedPoint) -> PlannedPoint:
+    """A point as it is now that its study lists it: what was done may have been cleaned away."""
+    was_there = planned.state in (State.DONE, State.STALE)
+    if was_there and not (planned.point.folder / "record.json").exists():
+        return dataclasses.replace(planned, state=State.MISSING)
+    return planned
 
 
 def _print_plan(plan: Sequence[PlannedPoint], selection: Sequence[PlannedPoint]) -> None:

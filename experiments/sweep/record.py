@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from contextlib import suppress
@@ -14,7 +13,7 @@ import pandas as pd
 from experiments.config.settings import Settings
 from experiments.point.tables import table_bytes
 from experiments.tracking.environment import environment, peak_memory
-from experiments.tracking.files import digest, replace_file
+from experiments.tracking.files import digest, read_file, replace_file
 from experiments.tracking.points import Point
 from experiments.tracking.store import Store
 from experiments.tracking.tables import rounded
@@ -37,7 +36,7 @@ def write_result(
         store: the store that it used, which knows stages and times.
         attempt: number and start of the attempt.
     """
-    files = {"log.txt": digest((point.folder / "log.txt").read_bytes())}
+    files = {"log.txt": digest(read_file(point.folder / "log.txt"))}
     for name, frame in sorted(tables.items()):
         data = table_bytes(name, frame, settings)
         files[f"{name}.csv"] = digest(data)
@@ -57,7 +56,7 @@ def write_result(
         "peak_memory_mb": peak_memory(),
         **environment(point.results),
     }
-    write_note(point, "record", record)
+    point.write_note("record", record)
 
 
 def write_failure(point: Point, reason: str, error: str, traceback: str, attempt: int) -> None:
@@ -84,14 +83,8 @@ def write_failure(point: Point, reason: str, error: str, traceback: str, attempt
         "seconds": spent and round(spent.total_seconds(), 3),
     }
     with suppress(OSError):
-        write_note(point, "failure", failure)
+        point.write_note("failure", failure)
         (point.folder / "attempt.json").unlink(missing_ok=True)
-
-
-def write_note(point: Point, name: str, content: Mapping[str, Any]) -> None:
-    """Write `record`, `failure` or `attempt`."""
-    data = json.dumps(content, indent=1, allow_nan=False).encode() + b"\n"
-    replace_file(point.folder / f"{name}.json", data)
 
 
 def _finite(value: Any) -> Any:

@@ -10,9 +10,10 @@ from experiments.config.read import ConfigError, plain_tree, writable_results
 from experiments.progress import steps_shown
 from experiments.sweep import attempt
 from experiments.sweep.plan import read_point
+from experiments.tracking.files import read_file
 from experiments.tracking.points import State
 
-_SWEEP_ONLY = ("only", "limit", "time_limit", "retries", "fail_fast", "mix_sources")
+_SWEEP_ONLY = ("only", "limit", "time_limit", "retries", "fail_fast", "mix_sources", "replace")
 
 
 @steps_shown()
@@ -29,7 +30,7 @@ def run_single(tree: dict[str, Any]) -> None:
     if study.sweep.dry_run:
         print(f"{point.state()}: {point.folder}")
     elif point.is_done() and not study.sweep.force:
-        print((point.folder / "log.txt").read_text(), end="")
+        print(read_file(point.folder / "log.txt").decode(errors="replace"), end="")
         print(f"finished before: {point.folder}")
     else:
         writable_results(study)

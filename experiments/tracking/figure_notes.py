@@ -9,24 +9,26 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.tracking.files import digest, replace_file
+from experiments.tracking.files import digest, read_file
+from experiments.tracking.names import inner_path, is_digest, is_name
+from experiments.tracking.sealed import SealError, read_sealed, write_sealed
 from experiments.tracking.sources import source_hash
 from experiments.tracking.study import Collated, whole_study
 
 NOTE = "figures.json"
 SUFFIXES = (".png", ".pdf", ".txt")
+_FILES = ("tables", "files")  # of a figure's note, by name with digests
 _FIGURES = "paper_figures"  # the package whose modules draw
 
 
 def sentence(folder: Path) -> str:
     """The origin of a study's data in words: points, commit, date."""
     study = whole_study(folder)
-    if study is None or study.collated is None:
+    if study is None or study.collated is None or not study.collated.points:
         return f"study {folder.name}, whose points are not listed"
     collated = study.collated
     count = len(collated.points)
@@ -52,26 +54,52 @@ def figure_note(path: Path, module: str, tables: Mapping[str, bytes]) -> dict[st
         "module": module,
         "drawn_by": _drawing_source(module),
         "tables": {name: digest(data) for name, data in tables.items()},
-        "files": {file.name: digest(file.read_bytes()) for file in files},
+        "files": {file.name: digest(read_file(file)) for file in files},
     }
 
 
 def read_note(folder: Path) -> dict[str, dict[str, Any]]:
-    """What is listed of each figure of a study; nothing if there is no such list."""
+    """What is listed of each figure of a study; nothing if there is no such list, or none whole."""
     try:
-        figures = json.loads((folder / "figures" / NOTE).read_bytes())["figures"]
-        return {
-            name: {key: note[key] for key in ("module", "drawn_by", "tables", "files")}
-            for name, note in figures.items()
-        }
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return _listed_figures(folder)
+    except (OSError, ValueError):
         return {}
+
+
+def note_damage(folder: Path) -> str | None:
+    """Why the list of a study's figures cannot be read; None if it can, or if there is none."""
+    try:
+        _listed_figures(folder)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        return f"{NOTE} cannot be read, so draw them again ({error})"
+    return None
+
+
+def _listed_figures(folder: Path) -> dict[str, dict[str, Any]]:
+    """The list of a study's figures; raises an OSError or ValueError if it is not whole."""
+    path = inner_path(folder, "figures", NOTE)
+    try:
+        figures = {
+            name: {key: note[key] for key in ("module", "drawn_by", "tables", "files")}
+            for name, note in read_sealed(path)["figures"].items()
+        }
+        files = [it for note in figures.values() for key in _FILES for it in note[key].items()]
+    except (KeyError, TypeError, AttributeError):
+        raise SealError(f"{path} is no list of figures") from None
+    if not (
+        all(is_name(name) and is_digest(it) for name, it in files)
+        and all(is_name(each) for name, note in figures.items() for each in (name, note["module"]))
+    ):
+        raise SealError(f"{path} names something that is no figure and no table")
+    return figures
 
 
 def write_note(folder: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
     """List the figures of a study, each by its `figure_note`."""
     note = {"study": _data_origin(folder), "figures": dict(sorted(figures.items()))}
-    replace_file(folder / "figures" / NOTE, json.dumps(note, indent=1).encode() + b"\n")
+    write_sealed(inner_path(folder, "figures", NOTE), note)
 
 
 def concerns(folder: Path) -> dict[str, list[str]]:
@@ -80,20 +108,33 @@ def concerns(folder: Path) -> dict[str, list[str]]:
     for name, note in sorted(read_note(folder).items()):
         changes = reasons[name] = []
         for file, before in note["files"].items():
-            path = folder / "figures" / file
-            if not path.exists():
-                changes.append(f"{file} is missing")
-            elif digest(path.read_bytes()) != before:
-                changes.append(f"{file} was changed after it was drawn")
+            if now := file_change(folder / "figures" / file, before, "drawn"):
+                changes.append(now)
         for table, before in note["tables"].items():
-            path = folder / "tables" / table
-            if not path.exists():
-                changes.append(f"table {table} is missing")
-            elif digest(path.read_bytes()) != before:
-                changes.append(f"table {table} has changed since")
+            if now := file_change(folder / "tables" / table, before, None):
+                changes.append(f"table {now}")
         if note["drawn_by"] != _drawing_source(note["module"]):
             changes.append("the code that draws has changed since")
     return reasons
+
+
+def file_change(path: Path, before: str, verb: str | None) -> str | None:
+    """What became of a file since it had a digest; None if it is the same.
+
+    Args:
+        path: the file.
+        before: its sha256.
+        verb: how it was made, "written"; None if it may be made anew.
+    """
+    try:
+        if digest(read_file(path)) == before:
+            return None
+    except FileNotFoundError:
+        return f"{path.name} is missing"
+    except OSError as error:
+        return f"{path.name} cannot be read: {error.strerror}"
+    change = f"was changed after it was {verb}" if verb else "has changed since"
+    return f"{path.name} {change}"
 
 
 def _drawing_source(module: str) -> str:
@@ -104,7 +145,7 @@ def _drawing_source(module: str) -> str:
 def _data_origin(folder: Path) -> dict[str, Any] | None:
     """Points, source, commits and dates behind a study's tables; None if they are not listed."""
     study = whole_study(folder)
-    if study is None or study.collated is None:
+    if study is None or study.collated is None or not study.collated.points:
         return None
     collated = study.collated
     return {

@@ -1,24 +1,52 @@
-"""Writing files so that, whatever happens, each is the old one or the new one; digests."""
+"""The one way to read and to write a file of results; digests.
+
+Whatever happens while it is written, a file is the old one or the new one. Files of results may
+come from anybody, so only regular files are read: no link, which could lead anywhere, and no pipe,
+which could keep a reader waiting for ever.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import errno
 import hashlib
 import os
-import tempfile
+import secrets
+import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, TextIO
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PART = ".part"  # the end of the names of files that are being written
 
+_EXCHANGE, _HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux
+
 
 def digest(data: bytes) -> str:
     """sha256 in hexadecimal."""
     return hashlib.sha256(data).hexdigest()
+
+
+def read_file(path: Path) -> bytes:
+    """The content of a regular file.
+
+    Raises:
+        OSError: there is no such file, or it is a link, a pipe or a folder.
+    """
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise OSError(errno.ELOOP, "is a link, which is not followed", str(path)) from None
+        raise
+    with open(handle, "rb") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(errno.EINVAL, "is no regular file", str(path))
+        return file.read()
 
 
 def replace_file(path: Path, data: bytes) -> None:
@@ -31,24 +59,77 @@ def replace_file(path: Path, data: bytes) -> None:
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """A file to write; it takes the place of the old one when the block ends, all of it on disk.
 
-    Its attribute `name` is its path until then.
+    Its attribute `name` is its path until then. Who may read it is up to the umask.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=PART)
-    os.close(handle)
+    name = part_of(path)
     try:
-        with open(name, "wb") as file:
+        with open(name, "xb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        os.chmod(name, 0o644)
         os.replace(name, path)
+        _sync_folder(path.parent)
     except BaseException:
-        os.unlink(name)
+        with suppress(FileNotFoundError):
+            os.unlink(name)
         raise
+
+
+@contextmanager
+def growing(path: Path) -> Iterator[TextIO]:
+    """A new file for a log, line by line on disk while its process runs; an old one is removed."""
+    path.unlink(missing_ok=True)  # never written into: it may be a link
+    with open(path, "x", buffering=1, encoding="utf-8", errors="backslashreplace") as file:
+        yield file
+
+
+def part_of(path: Path) -> Path:
+    """A new name beside a file or folder, for what takes its place once it is whole."""
+    return path.with_name(f".{path.name[:200]}-{secrets.token_hex(4)}{PART}")
+
+
+def exchange_folders(new: Path, old: Path) -> None:
+    """Let two folders of one parent change names, at once where the system can (Linux).
+
+    Elsewhere there is a moment without the old name. If there is no old folder, the new one takes
+    its name.
+    """
+    try:
+        os.rename(new, old)  # works where there is none, or an empty one
+    except OSError as error:
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+            raise
+        if not _exchanged(new, old):
+            aside = part_of(old)
+            os.rename(old, aside)
+            os.rename(new, old)
+            os.rename(aside, new)
+    _sync_folder(old.parent)
 
 
 def csv_bytes(frame: pd.DataFrame, *, header: bool = True) -> bytes:
     """A table as CSV, floats exact; without its header, the rows alone."""
     text: str = frame.to_csv(index=False, header=header, lineterminator="\n")
     return text.encode()
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Let two paths change names in one step; False where system or file system cannot."""
+    rename = getattr(ctypes.CDLL(None), "renameat2", None)
+    if rename is None:
+        return False
+    status: int = rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE)
+    return status == 0
+
+
+def _sync_folder(folder: Path) -> None:
+    """Have the names in a folder on disk, where its file system can do that for folders."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+            raise
+    finally:
+        os.close(handle)

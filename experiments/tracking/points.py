@@ -3,12 +3,11 @@
 `<results>/points/<identity>/` holds the point's tables, its `log.txt` and, written last, the
 `record.json` that makes it count; or the `failure.json` of its last attempt. While an attempt runs,
 its process holds `.lock`, which the system frees when that process ends, and `attempt.json` says
-who it is.
+who it is. Each of these notes carries its own digest, and the record those of the other files.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -18,12 +17,15 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from experiments.tracking.files import digest
+from experiments.tracking.files import digest, read_file
+from experiments.tracking.names import inner_path, is_digest, is_identity, is_name
+from experiments.tracking.sealed import SealError, read_sealed, write_sealed
 from experiments.tracking.sources import source_hash
 from experiments.tracking.trees import canonical_json
 
-# The module that computes a point: named, so that its source counts, and not imported.
-POINT_CODE = "experiments.point.run"
+# The modules that compute a point and write its tables: named, so that their source counts, and not
+# imported. The second counts without what it imports, as that is about records.
+_COMPUTES, _WRITES = "experiments.point.run", "experiments.sweep.record"
 
 
 class State(StrEnum):
@@ -34,6 +36,7 @@ class State(StrEnum):
     FAILED = "failed"
     RUNNING = "running"  # in this sweep or another, on this machine or another
     MISSING = "missing"
+    SHIPPED = "shipped"  # not here, but in tables that came without it; never of a sweep's points
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ class Point:
             config: all that decides the point's result, as plain nested values.
             results: the folder of all results.
         """
-        return cls(results, digest(canonical_json(config))[:32], config)
+        return cls(results, _identity(config), config)
 
     @cached_property
     def config(self) -> Mapping[str, Any]:
@@ -70,12 +73,16 @@ class Point:
     @cached_property
     def source(self) -> str:
         """Hash of all the source that the result depends on, as it is now; runs none of it."""
-        target = str(self.config.get("system", {}).get("target", ""))
-        return source_hash([POINT_CODE, target.rpartition(".")[0]])
+        return point_source(system_module(self.config))
 
     @property
     def folder(self) -> Path:
-        return self.results / "points" / self.identity
+        """Where its files are.
+
+        Raises:
+            UnsafePath: its identity is no plain name, or the folder is a link.
+        """
+        return inner_path(self.results, "points", self.identity)
 
     @property
     def lock(self) -> FileLock:
@@ -95,15 +102,28 @@ class Point:
 
     def record(self) -> dict[str, Any] | None:
         """The record, or None unless this point finished and its files are as they were written."""
-        record = self.note("record")
         try:
-            files = record["files"].items() if record else ()
-            unchanged = all(
-                digest((self.folder / name).read_bytes()) == recorded for name, recorded in files
-            )
-        except (OSError, KeyError, TypeError, AttributeError):
+            return self._whole_record()
+        except (OSError, ValueError):
             return None
-        return record if unchanged else None
+
+    def damage(self) -> str | None:
+        """Why a record that is there does not count; None if it counts, or if there is none."""
+        try:
+            self._whole_record()
+        except FileNotFoundError as error:
+            return None if error.filename == str(self.folder / "record.json") else _reason(error)
+        except (OSError, ValueError) as error:
+            return _reason(error)
+        return None
+
+    def _whole_record(self) -> dict[str, Any]:
+        """The record; raises an OSError or ValueError if it or a file that it lists is damaged."""
+        record = self._read_note("record")
+        for name, recorded in record["files"].items():
+            if digest(read_file(self.folder / name)) != recorded:
+                raise SealError(f"{self.folder / name} is not as the point wrote it")
+        return record
 
     def failure(self) -> dict[str, Any] | None:
         """How the last attempt failed, or None if it did not."""
@@ -132,9 +152,62 @@ class Point:
             return True
 
     def note(self, name: str) -> dict[str, Any] | None:
-        """Content of `record`, `failure` or `attempt`, or None unless it is this point's."""
+        """Content of `record`, `failure` or `attempt`, or None unless it is whole and this point's.
+
+        The files that a record lists may be damaged all the same.
+        """
         try:
-            content: dict[str, Any] = json.loads((self.folder / f"{name}.json").read_bytes())
-            return content if content["identity"] == self.identity else None
-        except (OSError, ValueError, KeyError, TypeError):
+            return self._read_note(name)
+        except (OSError, ValueError):
             return None
+
+    def write_note(self, name: str, content: Mapping[str, Any]) -> None:
+        """Write `record`, `failure` or `attempt`."""
+        write_sealed(self.folder / f"{name}.json", content)
+
+    def _read_note(self, name: str) -> dict[str, Any]:
+        """A note; raises an OSError or ValueError if it is damaged or another point's."""
+        path = self.folder / f"{name}.json"
+        content = read_sealed(path)
+        if content.get("identity") != self.identity:
+            raise SealError(f"{path} is of another point")
+        if name == "record":
+            _check_record(path, content)
+        return content
+
+
+def system_module(config: Mapping[str, Any]) -> str:
+    """The module of the system in a point's config; empty if it is not known."""
+    system = config.get("system")
+    target = system.get("target", "") if isinstance(system, Mapping) else ""
+    return str(target).rpartition(".")[0]
+
+
+def point_source(module: str) -> str:
+    """Hash of all the source, as it is now, that a point with a module's system depends on."""
+    return source_hash([_COMPUTES, module], alone=[_WRITES])
+
+
+def _identity(config: Mapping[str, Any]) -> str:
+    """The identity of the point of a config."""
+    return digest(canonical_json(config))[:32]
+
+
+def _check_record(path: Path, record: Mapping[str, Any]) -> None:
+    """Raise unless a record names files and stages as points do, and is of its own config."""
+    try:
+        is_whole = (
+            _identity(record["config"]) == record["identity"]
+            and all(is_name(name) and is_digest(it) for name, it in record["files"].items())
+            and all(is_name(name) and is_identity(it) for name, it in record["stages"].items())
+            and (record["git"]["diff"] is None or is_name(record["git"]["diff"]))
+        )
+    except (KeyError, TypeError, AttributeError, ValueError):
+        is_whole = False
+    if not is_whole:
+        raise SealError(f"{path} is no record of this point")
+
+
+def _reason(error: Exception) -> str:
+    """An error on one line."""
+    return f"{error.filename}: {error.strerror}" if isinstance(error, OSError) else str(error)

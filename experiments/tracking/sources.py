@@ -1,39 +1,83 @@
-"""The source code that a result depends on, as a hash."""
+"""The source code that a result depends on, and the packages that decide its numbers, as a hash.
+
+Code counts by its syntax tree. What changes no result is left out: comments, docstrings, layout,
+and what is said to people, by `print`, `log` or a logger.
+"""
 
 from __future__ import annotations
 
 import ast
 import importlib.util
 import os
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.machinery import ModuleSpec, PathFinder
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from experiments.tracking.files import digest
 from experiments.tracking.trees import canonical_json
 
-# Imports from these packages count wherever they occur; of all other packages none does.
+# Imports from these packages count wherever they occur, by their source; others by their version.
 _PROJECT = ("experiments", "mlci", "paper_figures")
+# Packages that decide no number: what reads configs, guards files, draws bars.
+_PLUMBING = {
+    "filelock",
+    "hydra",
+    "omegaconf",
+    "pebble",
+    "pydantic",
+    "pydantic_core",
+    "tqdm",
+    "yaml",
+}
+# Modules that word and show what is said to people, and what says it.
+_WORDS = ("experiments.console", "experiments.terminal", "experiments.progress")
+_SPEAKERS = {"print", "log", "_log", "write_line", "begin"}
 
 
-def source_hash(modules: Iterable[str]) -> str:
+def source_hash(modules: Iterable[str], alone: Iterable[str] = ()) -> str:
     """Hash of the source of some modules and of all that they import, directly or not.
 
     Imports count from this project and from the packages of the modules themselves; for a module
-    in no package, from the modules and packages in its folder. Sources are read, never run: a name
-    may come from a file of results.
+    in no package, from the modules and packages in its folder. Of other packages the version
+    counts. Sources are read, never run: a name may come from a file of results.
+
+    Args:
+        modules: their full names.
+        alone: more modules, which count without what they import.
     """
     sources: dict[str, str] = {}
+    outside: set[str] = set()
     waiting = list(modules)
     packages = {name.partition(".")[0] for name in waiting}.union(_PROJECT)
     packages.update(*(_neighbours(name) for name in waiting if "." not in name))
     while waiting:
         name = waiting.pop()
-        if name not in sources:
-            sources[name], imported = _read_source(name)
-            waiting += [other for other in imported if other.partition(".")[0] in packages]
-    return digest(canonical_json(sources))
+        if name in sources or name in _WORDS:
+            continue
+        sources[name], imported = _read_source(name)
+        for other in imported:
+            top = other.partition(".")[0]
+            if top in packages:
+                waiting.append(other)
+            else:
+                outside.add(top)
+    sources |= {name: _read_source(name)[0] for name in alone}
+    versions = {name: it for name in outside if (it := _version(name)) is not None}
+    return digest(canonical_json({"sources": sources, "versions": versions}))
+
+
+@cache
+def _version(package: str) -> str | None:
+    """Version of an installed package, or None if it decides no number."""
+    if package in sys.stdlib_module_names or package in _PLUMBING:
+        return None
+    try:
+        return version(package)
+    except (PackageNotFoundError, ValueError):
+        return None
 
 
 @cache
@@ -54,9 +98,9 @@ def _read_source(name: str) -> tuple[str, tuple[str, ...]]:
     spec = _find(name)
     if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
         return "", ()
-    data = Path(spec.origin).read_bytes()
+    tree = ast.parse(Path(spec.origin).read_bytes())
     imported: list[str] = []
-    for node in ast.walk(ast.parse(data)):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             imported += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -66,7 +110,46 @@ def _read_source(name: str) -> tuple[str, tuple[str, ...]]:
             # `from package import module` names a module only if it is one.
             inner = [f"{origin}.{alias.name}" for alias in node.names]
             imported += [other for other in inner if other in _module_names(origin)]
-    return digest(data), tuple(imported)
+    return digest("\n".join(_words(tree)).encode()), tuple(imported)
+
+
+def _words(node: ast.AST) -> Iterator[str]:
+    """A syntax tree as words, without what changes no result; the same for all versions of Python.
+
+    A field that is empty is left out, as some versions have more of them than others.
+    """
+    yield f"({type(node).__name__}"
+    for name in node._fields:
+        value = getattr(node, name, None)
+        if isinstance(value, ast.AST):
+            yield name
+            yield from _words(value)
+        elif isinstance(value, list):
+            if name == "body":
+                value = [part for part in value if not _is_silent(part)]
+            if value:
+                yield f"{name}["
+                for part in value:
+                    if isinstance(part, ast.AST):
+                        yield from _words(part)
+                    else:
+                        yield repr(part)
+                yield "]"
+        elif value is not None and name not in ("kind", "type_comment"):
+            yield f"{name}={value!r}"
+    yield ")"
+
+
+def _is_silent(node: ast.AST) -> bool:
+    """Whether a statement changes no result: a text of its own, or a call that says something."""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return True
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+        speaker = node.value.func
+        while isinstance(speaker, ast.Attribute):
+            speaker = speaker.value
+        return isinstance(speaker, ast.Name) and speaker.id in _SPEAKERS
+    return False
 
 
 def _find(name: str) -> ModuleSpec | None:

@@ -1,13 +1,13 @@
 """Arrays that many points share, stored by the content of what they depend on.
 
 An entry is `<stage>/<key>.npz` and, written after it, `<key>.json`: what the key was made from
-and a digest of the arrays. An entry that does not match its digest is computed again, never used.
+and a digest of the file of arrays. An entry that does not match its digest is computed again, never
+used.
 """
 
 from __future__ import annotations
 
 import io
-import json
 import logging
 import time
 import zipfile
@@ -22,7 +22,9 @@ from filelock import FileLock
 from numpy.typing import NDArray
 
 from experiments.progress import begin
-from experiments.tracking.files import digest, replace_file
+from experiments.tracking.files import digest, read_file, replace_file
+from experiments.tracking.names import inner_path
+from experiments.tracking.sealed import read_sealed, write_sealed
 from experiments.tracking.sources import source_hash
 from experiments.tracking.trees import canonical_json, plain
 
@@ -73,7 +75,7 @@ class Store:
         key = digest(canonical_json(made_from))[:32]
         self.keys[stage] = key
         with self.timed(stage):
-            folder = self.folder / stage
+            folder = inner_path(self.folder.parent, self.folder.name, stage)
             folder.mkdir(parents=True, exist_ok=True)
             # Whoever comes second waits here, and then reads.
             with FileLock(folder / f"{key}.lock"):
@@ -86,7 +88,11 @@ class Store:
 
     def read(self, stage: str, key: str) -> Stored | None:
         """The arrays of a stage under a key that a point's record has; None if they are gone."""
-        arrays = _read_entry(self.folder / stage, key)
+        try:
+            folder = inner_path(self.folder.parent, self.folder.name, stage)
+        except OSError:
+            return None
+        arrays = _read_entry(folder, key)
         return None if arrays is None else Stored(key, arrays)
 
     @contextmanager
@@ -106,8 +112,8 @@ def _read_entry(folder: Path, key: str) -> dict[str, NDArray[Any]] | None:
     if not note.exists():
         return None
     try:
-        data = arrays.read_bytes()
-        if digest(data) != json.loads(note.read_bytes())["digest"]:
+        data = read_file(arrays)
+        if digest(data) != read_sealed(note)["arrays"]:
             raise ValueError("it does not match its digest")
         with np.load(io.BytesIO(data), allow_pickle=False) as entry:
             return {name: entry[name] for name in entry.files}
@@ -127,5 +133,4 @@ def _write_entry(folder: Path, key: str, arrays: Arrays, made_from: Mapping[str,
     data = buffer.getvalue()
     (folder / f"{key}.json").unlink(missing_ok=True)
     replace_file(folder / f"{key}.npz", data)
-    note = {**made_from, "digest": digest(data)}
-    replace_file(folder / f"{key}.json", json.dumps(note, indent=1).encode() + b"\n")
+    write_sealed(folder / f"{key}.json", {**made_from, "arrays": digest(data)})

@@ -5,6 +5,7 @@
  "collated": null or {
    "points": [identity, ...],                    in the order of the tables' rows
    "sources": {hash of the source: points, ...},
+   "systems": [module, ...], "made_by": hash of the source that made the tables,
    "commits": [git commit, ...], "dirty": whether any had changes,
    "started": [first, last],                     when its points were run
    "seconds": of all points, "peak_memory_mb": the most of one,
@@ -14,18 +15,19 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from experiments.tracking.files import replace_file
+from experiments.tracking.names import inner_path, is_digest, is_identity, is_name
+from experiments.tracking.points import Point, system_module
+from experiments.tracking.sealed import SealError, read_sealed, write_sealed
+from experiments.tracking.sources import source_hash
 from experiments.tracking.trees import plain
 
-if TYPE_CHECKING:
-    from experiments.tracking.points import Point
+_COLLATES = "experiments.collate.join"  # named, so that its source counts, and not imported
 
 
 class StudyError(Exception):
@@ -39,6 +41,8 @@ class Collated:
     Attributes:
         points: identities, in the order of the tables' rows.
         sources: how many points come from each version of the source, by its hash.
+        systems: the modules of the points' systems, which tell what the source is now.
+        made_by: hash of the source that made the tables of those of the points.
         commits: the git commits that were checked out, where they are known.
         dirty: whether anything differed from them.
         started: when the first and the last point were started, as ISO 8601.
@@ -51,6 +55,8 @@ class Collated:
 
     points: tuple[str, ...]
     sources: Mapping[str, int]
+    systems: tuple[str, ...]
+    made_by: str
     commits: tuple[str, ...]
     dirty: bool
     started: tuple[str, str]
@@ -59,6 +65,11 @@ class Collated:
     machines: tuple[str, ...]
     versions: tuple[str, ...]
     tables: Mapping[str, str]
+
+
+def table_source() -> str:
+    """Hash of the source, as it is now, that makes a study's tables of those of its points."""
+    return source_hash([_COLLATES])
 
 
 def collated(records: Mapping[str, Mapping[str, Any]], tables: Mapping[str, str]) -> Collated:
@@ -79,11 +90,13 @@ def collated(records: Mapping[str, Mapping[str, Any]], tables: Mapping[str, str]
     return Collated(
         points=tuple(records),
         sources=dict(sorted(Counter(record["source"] for record in each).items())),
+        systems=tuple(sorted({system_module(record["config"]) for record in each})),
+        made_by=table_source(),
         commits=tuple(sorted({r["git"]["commit"] for r in each if r["git"]["commit"]})),
         dirty=any(record["git"]["dirty"] for record in each),
-        started=(min(started), max(started)),
+        started=(min(started, default=""), max(started, default="")),
         seconds=round(sum(record["seconds"]["total"] for record in each), 1),
-        peak_memory_mb=max(record["peak_memory_mb"] for record in each),
+        peak_memory_mb=max((record["peak_memory_mb"] for record in each), default=0),
         machines=tuple(sorted({f"{r['cpu']}, {r['cores']} cores, {r['system']}" for r in each})),
         versions=tuple(sorted(versions)),
         tables=tables,
@@ -117,7 +130,7 @@ class Study:
             "examples": plain(self.examples),
             "collated": plain(self.collated),
         }
-        replace_file(self.folder / "study.json", json.dumps(tree, indent=1).encode() + b"\n")
+        write_sealed(_listing(self.folder), tree)
 
 
 def read_study(folder: Path) -> Study | None:
@@ -128,20 +141,38 @@ def read_study(folder: Path) -> Study | None:
     """
     path = folder / "study.json"
     try:
-        tree: dict[str, Any] = json.loads(path.read_bytes())
+        tree = read_sealed(_listing(folder))
         points = {name: tuple(overrides) for name, overrides in tree["points"].items()}
         lists: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value
             for name, value in (tree["collated"] or {}).items()
         }
         collated = Collated(**lists) if lists else None
+        _check_names(path, points, collated)
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise StudyError(
-            f"{path} cannot be read as a study; the study's own command writes it anew"
+            f"{path} cannot be read as a study; the study's own command writes it anew "
+            f"({error.strerror if isinstance(error, OSError) else error})"
         ) from None
     return Study(folder, points, tree.get("examples", {}), collated)
+
+
+def _listing(folder: Path) -> Path:
+    """The path of a study's listing, whose folder and name are no links."""
+    return inner_path(folder.parent, folder.name, "study.json")
+
+
+def _check_names(path: Path, points: Iterable[object], collated: Collated | None) -> None:
+    """Raise unless the points and tables that a study lists are named as such."""
+    tables = collated.tables if collated else {}
+    identities = [*points, *(collated.points if collated else ())]
+    if not (
+        all(map(is_identity, identities))
+        and all(is_name(name) and is_digest(it) for name, it in tables.items())
+    ):
+        raise SealError(f"{path} names something that is no point and no table")
 
 
 def write_plan(

@@ -18,6 +18,8 @@ from pathlib import Path
 
 from experiments.config.paths import default_results
 from experiments.tracking.files import replace_file
+from experiments.tracking.names import inner_path
+from experiments.tracking.report_note import write_note
 from paper_figures.report import page
 from paper_figures.report.document import FOLDER, report
 from paper_figures.report.study_tables import Results
@@ -26,7 +28,7 @@ _STOPPED = 130  # the exit status after Ctrl-C
 
 
 def main() -> int:
-    """Run the command line; returns the exit status."""
+    """Run the command line; returns 1 if tables or figures are not as they were written, else 0."""
     parser = argparse.ArgumentParser(prog="paper_figures.report", description=__doc__)
     parser.add_argument("--results", type=Path, help="folder of results", metavar="DIR")
     options = parser.parse_args()
@@ -37,16 +39,19 @@ def main() -> int:
         )
     for path in write(results):
         print(f"written: {path}")
-    return 0
+    for damage in dict.fromkeys(results.damage):
+        print(damage, file=sys.stderr)
+    return 1 if results.damage else 0
 
 
 def write(results: Results) -> list[Path]:
-    """Write REPORT.md and REPORT.html; returns their paths."""
-    folder, text = results.folder / FOLDER, report(results)
-    contents = {folder / "REPORT.md": text, folder / "REPORT.html": page.html(text, folder)}
-    for path, content in contents.items():
-        replace_file(path, content.encode())
-    return list(contents)
+    """Write REPORT.md and REPORT.html, and what they come from; returns the paths of the two."""
+    folder, text = inner_path(results.folder, FOLDER), report(results)
+    contents = {"REPORT.md": text.encode(), "REPORT.html": page.html(text, folder).encode()}
+    for name, content in contents.items():
+        replace_file(folder / name, content)
+    write_note(folder, results.digests, contents)
+    return [folder / name for name in contents]
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from experiments.tracking.figure_notes import file_change, read_note
 from paper_figures.report import (
     claim_1,
     claim_2,
@@ -215,11 +216,18 @@ def _figures(results: Results, figures: tuple[Figure, ...], numbers: Iterator[in
     """Those figures that are drawn, with the next numbers and paths from the report's folder."""
     lines = []
     for entry in figures:
-        path = results.folder / entry.study / "figures" / f"{entry.name}.png"
-        if path.is_file():
-            inside = f"figures/{path.name}"
-            relative = inside if entry.study == FOLDER else f"../{entry.study}/{inside}"
-            lines.append(figure(relative, next(numbers), entry.caption))
-        else:
+        file = f"{entry.name}.png"
+        note = read_note(results.folder / entry.study).get(entry.name)
+        if note is None:
             lines.append(f"The figure `{entry.name}` is not drawn yet; `make figures` does it.\n")
+            continue
+        path = results.folder / entry.study / "figures" / file
+        if change := file_change(path, note["files"].get(file, ""), "drawn"):
+            results.damage.append(f"{path.parent}: {change}; `make figures` draws it anew")
+            lines.append(f"The figure `{entry.name}` is not as it was drawn; see `make figures`.\n")
+            continue
+        results.digests[f"{entry.study}/figures/{file}"] = note["files"][file]
+        inside = f"figures/{file}"
+        relative = inside if entry.study == FOLDER else f"../{entry.study}/{inside}"
+        lines.append(figure(relative, next(numbers), entry.caption))
     return "\n".join(lines)

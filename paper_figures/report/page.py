@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import base64
-import mimetypes
+import os
 import re
 from html import unescape
 from pathlib import Path
 
 from markdown_it import MarkdownIt
 
+from experiments.tracking.files import read_file
+from experiments.tracking.names import inner_path
 from paper_figures.report.markdown import anchor
 
 _STYLE = """
@@ -25,6 +27,7 @@ figure { margin: 1rem 0 }
 figcaption { font-size: 0.9rem; color: #444 }
 img { max-width: 100%; display: block }
 """
+_PNG = b"\x89PNG\r\n\x1a\n"  # how such a file begins
 
 
 def html(markdown: str, folder: Path) -> str:
@@ -32,7 +35,8 @@ def html(markdown: str, folder: Path) -> str:
 
     Args:
         markdown: its text.
-        folder: what the paths of its figures are relative to.
+        folder: what the paths of its figures are relative to, in the folder of results. No
+            picture from elsewhere is embedded: words of a text may come from somebody's files.
     """
     body = MarkdownIt("commonmark", {"html": False}).enable("table").render(markdown)
     body = re.sub(r"<h2>(.*?)</h2>", _with_anchor, body)
@@ -57,7 +61,13 @@ def _with_anchor(heading: re.Match[str]) -> str:
 
 
 def _embedded(path: str, folder: Path) -> str:
-    """The beginning of an image's tag, its file in it."""
-    data = base64.b64encode((folder / path).read_bytes()).decode()
-    kind = mimetypes.guess_type(path)[0]
-    return f'<img src="data:{kind};base64,{data}"'
+    """The beginning of an image's tag, its file in it if that is a PNG of the results."""
+    results = folder.parent
+    try:
+        relative = Path(os.path.relpath(os.path.join(folder, path), results))
+        content = read_file(inner_path(results, *relative.parts))
+    except (OSError, ValueError):
+        content = b""
+    if not content.startswith(_PNG):
+        return '<img data-left-out="no picture of these results"'
+    return f'<img src="data:image/png;base64,{base64.b64encode(content).decode()}"'

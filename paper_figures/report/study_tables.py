@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +10,10 @@ from typing import Any
 
 import pandas as pd
 
+from experiments.tracking.files import digest
+from experiments.tracking.study import StudyError, read_study
+from experiments.tracking.study_tables import TableError, read_tables
+from experiments.tracking.trees import plain
 from paper_figures.rows import ACTIONS, SAMPLES
 
 # The commands that make what is in the folders of results.
@@ -39,10 +43,14 @@ class Results:
     Attributes:
         folder: `results`, which has a folder for each study.
         read: the tables that were read so far, by study and name.
+        digests: sha256 of each of them, by study and file.
+        damage: which tables and figures are not as they were written.
     """
 
     folder: Path
     read: dict[tuple[str, str], pd.DataFrame] = field(default_factory=dict)
+    digests: dict[str, str] = field(default_factory=dict)
+    damage: list[str] = field(default_factory=list)
 
     def table(self, study: str, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
         """A table of a study.
@@ -53,13 +61,19 @@ class Results:
             columns: what is needed of it.
 
         Raises:
-            Missing: there is no such table, or a column is not in it.
+            Missing: there is no such table, it is not as it was written, or a column is not in it.
         """
         if (study, name) not in self.read:
-            path = self.folder / study / "tables" / f"{name}.csv"
-            if not path.is_file():
-                raise Missing(study, f"the study `{study}` has no table `{name}` yet")
-            self.read[study, name] = pd.read_csv(path)
+            try:
+                content = read_tables(self.folder / study, [name])[name]
+            except FileNotFoundError:
+                raise Missing(study, f"the study `{study}` has no table `{name}` yet") from None
+            except TableError as error:
+                self.damage.append(str(error))
+                reason = f"the table `{name}` of the study `{study}` is not as it was written"
+                raise Missing(study, reason) from None
+            self.digests[f"{study}/tables/{name}.csv"] = digest(content)
+            self.read[study, name] = pd.read_csv(io.BytesIO(content))
         table = self.read[study, name]
         if lacking := [column for column in columns if column not in table]:
             raise Missing(
@@ -75,10 +89,14 @@ class Results:
             Missing: the study does not tell.
         """
         try:
-            content = json.loads((self.folder / study / "study.json").read_bytes())["collated"]
-            return {key: content[key] for key in _LISTING}
-        except (OSError, ValueError, KeyError, TypeError):
-            raise Missing(study, f"the study `{study}` does not list what it came from") from None
+            listed = read_study(self.folder / study)
+        except StudyError as error:
+            self.damage.append(str(error))
+            listed = None
+        if listed is None or listed.collated is None or not listed.collated.points:
+            raise Missing(study, f"the study `{study}` does not list what it came from")
+        content = plain(listed.collated)
+        return {key: content[key] for key in _LISTING}
 
     def studies(self) -> list[str]:
         """The studies that have tables."""

@@ -23,6 +23,8 @@ from pathlib import Path
 import pandas as pd
 from tqdm import tqdm
 
+from experiments.tracking.files import csv_bytes, digest, replace_file
+from experiments.tracking.study import collated, write_collated
 from tests.benchmark import kernels, sweeps
 from tests.benchmark.configs import telescope
 
@@ -43,7 +45,7 @@ def main() -> int:
     """Measure everything, print it and write the tables."""
     parser = argparse.ArgumentParser(prog="benchmark", description=__doc__)
     parser.add_argument("--results", type=Path, default=timing.ROOT / "results", metavar="DIR")
-    folder = parser.parse_args().results / "benchmark" / "tables"
+    folder = parser.parse_args().results / "benchmark"
     machine = timing.machine()
     print(", ".join(f"{key} {value}" for key, value in machine.items()))
     work = [
@@ -77,13 +79,16 @@ def main() -> int:
         "costs": pd.DataFrame([asdict(cost) for cost in costs]),
         "scale": pd.DataFrame(sizes),
     }
-    folder.mkdir(parents=True, exist_ok=True)
+    digests = {}
     for name, table in tables.items():
         for column, value in machine.items():
             table[column] = value
-        _round(table).to_csv(folder / f"{name}.csv", index=False, lineterminator="\n")
+        content = csv_bytes(_round(table))
+        digests[f"{name}.csv"] = digest(content)
+        replace_file(folder / "tables" / f"{name}.csv", content)
+    write_collated(folder, collated({}, digests))  # so that who reads the tables can check them
     _show(tables)
-    print(f"written: {folder}")
+    print(f"written: {folder / 'tables'}")
     return 0
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from commands import run_here
+from hand_made import alter
 from tiny_point import TINY, composed, computed, hopeless, planned
 
 from experiments import infer, results
@@ -24,6 +25,7 @@ from experiments.config.read import read_config
 from experiments.config.settings import Settings
 from experiments.tracking.figure_notes import figure_note, write_note
 from experiments.tracking.points import Point
+from experiments.tracking.sealed import read_sealed
 from experiments.tracking.study import write_plan
 
 TABLES = (
@@ -46,8 +48,7 @@ def swept(settings: Settings, folder: Path, study: str, **values: float) -> list
 
 def outdate(point: Point) -> None:
     """Leave a finished point as an older version of the source would have."""
-    path = point.folder / "record.json"
-    path.write_text(json.dumps({**json.loads(path.read_text()), "source": "another"}))
+    alter(point.folder / "record.json", source="another")
 
 
 def spelt(table: Path) -> list[dict[str, str]]:
@@ -102,9 +103,10 @@ def test_every_state_is_counted(settings: Settings, tmp_path: Path, look) -> Non
         status, out, _ = look("list")
         assert status == 0
         assert row(out, "study") == [
-            *("study", "points", "done", "stale", "failed", "running", "missing", "tables")
+            *("study", "points", "done", "stale", "failed", "running", "missing", "shipped"),
+            "tables",
         ]
-        assert row(out, "s ") == ["s", "5", "1", "1", "1", "1", "1", str(len(tables))]
+        assert row(out, "s ") == ["s", "5", "1", "1", "1", "1", "1", "0", str(len(tables))]
         _, out, _ = look("list", "s")
         for point, state in zip(
             points, ["done", "stale", "failed", "running", "missing"], strict=True
@@ -166,9 +168,7 @@ def test_show_tells_config_record_and_results(settings: Settings, tmp_path: Path
 
 def test_diff_shows_what_differs_and_nothing_else(settings: Settings, tmp_path: Path, look) -> None:
     one, two = swept(settings, tmp_path, "s")
-    path = two.folder / "record.json"
-    record = json.loads(path.read_text())
-    path.write_text(json.dumps({**record, "python": "3.99", "peak_memory_mb": 1}))
+    alter(two.folder / "record.json", python="3.99", peak_memory_mb=1)
     status, out, _ = look("diff", one.identity[:12], two.identity[:12])
     assert status == 0
     assert "config: 1 differs" in out
@@ -243,7 +243,7 @@ def test_mistakes_are_told_in_a_line(
 
 
 def test_beginning_of_several_points_is_refused(settings: Settings, tmp_path: Path, look) -> None:
-    for name in ("abc1", "abc2"):
+    for name in (f"abc{number:029}" for number in (1, 2)):
         (tmp_path / "points" / name).mkdir(parents=True)
     status, _, err = look("show", "abc")
     assert status == 2
@@ -251,7 +251,9 @@ def test_beginning_of_several_points_is_refused(settings: Settings, tmp_path: Pa
 
 
 def everything(folder: Path) -> set[Path]:
-    return {path for path in folder.rglob("*") if path.is_file()}
+    """All files but locks and what is in the trash."""
+    inside = {path for path in folder.rglob("*") if path.is_file()}
+    return {path for path in inside if path.relative_to(folder).parts[0] not in (".locks", "trash")}
 
 
 def test_clean_removes_what_no_study_uses_and_only_when_told(
@@ -275,8 +277,14 @@ def test_clean_removes_what_no_study_uses_and_only_when_told(
     look("clean", "--yes")
     assert everything(tmp_path) == used
     assert not loose.folder.exists()
+    (moved,) = (tmp_path / "trash").iterdir()
+    assert (moved / "points" / loose.identity / "record.json").exists()
     _, out, _ = look("clean", "--yes")
     assert out == "nothing to clean\n"
+    status, out, _ = look("empty-trash")
+    assert status == 0
+    assert out.startswith(f"removed: {moved} (")
+    assert not moved.exists()
 
 
 def test_clean_keeps_a_running_point_and_then_the_store(
@@ -380,9 +388,8 @@ def test_status_tells_why_not(
         (tmp_path / "s" / "figures" / "curve.txt").write_text("by hand")
     elif harm == "edit":
         note = tmp_path / "s" / "figures" / "figures.json"
-        note.write_text(
-            re.sub('"drawn_by": "[0-9a-f]+"', '"drawn_by": "another"', note.read_text())
-        )
+        (curve,) = read_sealed(note)["figures"].values()
+        alter(note, figures={"curve": {**curve, "drawn_by": "another"}})
     elif harm == "stale":
         for point in points:
             outdate(point)

@@ -20,6 +20,7 @@ from sweeps import gone
 
 from experiments.config.paths import CHECKOUT
 from experiments.tracking.figure_notes import concerns
+from experiments.tracking.sealed import write_sealed
 from paper_figures import state_space
 from paper_figures.__main__ import main
 from paper_figures.drawing import FIGURES, Drawing, draw_studies
@@ -82,7 +83,7 @@ def test_any_number_of_processes_writes_the_same_files(tmp_path: Path) -> None:
 
 
 def test_every_file_tells_its_origin(tmp_path: Path) -> None:
-    write_tables(tmp_path, STATE_SPACE)
+    digests = write_tables(tmp_path, STATE_SPACE)
     (png,) = draw(tmp_path).images
     sources = [f"study {tmp_path.name}, whose points are not listed"]
     collated = {
@@ -91,9 +92,10 @@ def test_every_file_tells_its_origin(tmp_path: Path) -> None:
         "commits": ["c" * 40],
         "dirty": True,
         "started": ["2026-01-02T03:04:05+00:00", "2026-01-02T03:05:06+00:00"],
-        **{"seconds": 1.0, "peak_memory_mb": 1, "machines": [], "versions": [], "tables": {}},
+        **{"seconds": 1.0, "peak_memory_mb": 1, "machines": [], "versions": []},
+        **{"systems": [], "made_by": "", "tables": digests},
     }
-    (tmp_path / "study.json").write_text(json.dumps({"points": {}, "collated": collated}))
+    write_sealed(tmp_path / "study.json", {"points": {}, "examples": {}, "collated": collated})
     before = png.read_bytes(), png.with_suffix(".pdf").read_bytes()
     texts = [Image.open(png).text, png.with_suffix(".txt").read_text()]
     draw(tmp_path)

@@ -42,13 +42,19 @@ class SweepSettings:
     mix_sources: Annotated[
         Flag, about("let tables join points of different versions of the source")
     ]
+    replace: Annotated[
+        Flag, about("let a study of this name lose points that are not in the sweep")
+    ]
 
 
 @dataclass(frozen=True, config=STRICT)
 class StudySettings:
     """What changes no result, so that it is no part of a point's identity."""
 
-    study: Annotated[Word, about("a sweep's tables go to `RESULTS/STUDY/tables`")]
+    study: Annotated[
+        Word | None,
+        about("a sweep's tables go to `RESULTS/STUDY/tables`; null makes a name of its points"),
+    ]
     case: Annotated[
         Word | None,
         about("what a point is an instance of, in words, for the study's table of cases"),

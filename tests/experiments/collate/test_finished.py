@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from hand_made import hand_made
+from hand_made import alter, hand_made
 
 from experiments.collate.finished import CollateError, FinishedPoint
 from experiments.tracking.points import Point
@@ -50,7 +49,7 @@ def test_a_point_without_a_record_is_refused(harm: str, tmp_path: Path) -> None:
     elif harm == "broken":
         path.write_text('{"identity"')
     else:
-        path.write_text(json.dumps({**json.loads(path.read_text()), "identity": "0"}))
+        alter(path, identity="0" * 32)
     with pytest.raises(CollateError, match=f"point {point.identity} is not finished: {tmp_path}"):
         FinishedPoint.read(Point(tmp_path, point.identity))
 

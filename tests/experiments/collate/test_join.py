@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,12 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from hand_made import hand_made
+from hand_made import alter, hand_made
 
 from experiments.collate.finished import CollateError
 from experiments.collate.join import collate
 from experiments.tracking.files import digest
 from experiments.tracking.points import Point
+from experiments.tracking.sealed import read_sealed
 from experiments.tracking.study import Study, read_study, write_plan
 
 NUMBERS = [1 / 3, 1e-300, 5e-324, -0.1, -0.0, 2**53 + 1.0, np.nextafter(1, 2), np.inf, np.nan]
@@ -225,9 +225,9 @@ def test_a_listing_that_is_broken_is_written_anew(tmp_path: Path) -> None:
 def test_a_table_that_is_not_made_any_more_goes(tmp_path: Path) -> None:
     point, folder = point_with(tmp_path), tmp_path / "study"
     collate([point], folder)
-    listing = json.loads((folder / "study.json").read_text())
-    listing["collated"]["tables"]["former.csv"] = "0"
-    (folder / "study.json").write_text(json.dumps(listing))
+    listed = read_sealed(folder / "study.json")["collated"]
+    tables = {**listed["tables"], "former.csv": "0" * 64}
+    alter(folder / "study.json", collated={**listed, "tables": tables})
     for name in ("former.csv", "mine.csv"):
         (folder / "tables" / name).touch()
     collate([point], folder)

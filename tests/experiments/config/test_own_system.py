@@ -106,7 +106,7 @@ def test_every_command_works_in_a_folder_of_its_own(folder: Path) -> None:
     ]
 
     module = folder / "unicycle.py"
-    module.write_text(module.read_text() + "\n# Edited.\n")
+    module.write_text(module.read_text() + "\nEDITED = True\n")
     status, out, err = command(folder, f"{sweep} sweep.dry_run=true")
     assert "2 points: 2 stale; 2 to run" in out
     assert "2 stale" in " ".join(command(folder, "mlci-results status unicycle")[1].split())

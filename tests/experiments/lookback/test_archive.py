@@ -41,10 +41,11 @@ def test_points_are_found_by_the_beginning_of_their_identity(
 def test_a_name_that_fits_several_or_nothing_is_refused(
     points: list[Point], tmp_path: Path
 ) -> None:
-    for name in ("abc1", "abc2"):
+    names = [f"abc{number:029}" for number in (1, 2)]
+    for name in names:
         (tmp_path / "points" / name).mkdir()
     archive = Archive(tmp_path)
-    with pytest.raises(ArchiveError, match="abc: 2 points begin so, such as abc1, abc2"):
+    with pytest.raises(ArchiveError, match="abc: 2 points begin so, such as abc00000000, abc"):
         archive.find("abc")
     with pytest.raises(ArchiveError, match=r"soem: no such study or point; did you mean some\?"):
         archive.find("soem")

@@ -1,7 +1,6 @@
 """Attempts at a point: what they leave, whoever holds the lock and however they end."""
 
 import dataclasses
-import json
 import os
 import subprocess
 import sys
@@ -13,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from hand_made import alter
 from tiny_point import computed, hopeless, planned
 
 import experiments.point.run
 from experiments.config.settings import Settings
 from experiments.point.no_answer import NoAnswer
-from experiments.sweep import attempt, record
+from experiments.sweep import attempt
 from experiments.tracking.points import Point, State
 
 COLUMNS = ["truth", "cells", "actions", "dt", "samples", "seed"]
@@ -55,8 +55,7 @@ def test_state_follows_a_point(point: Point, settings: Settings) -> None:
     assert not point.folder.exists()
     attempt.run_here(point, settings, print)
     assert point.state() is State.DONE
-    record = point.folder / "record.json"
-    record.write_text(json.dumps(json.loads(record.read_text()) | {"source": "before an edit"}))
+    alter(point.folder / "record.json", source="before an edit")
     assert point.state() is State.STALE
     attempt.run_here(point, settings, print)
     assert point.state() is State.DONE
@@ -111,7 +110,7 @@ def test_attempt_clears_what_a_killed_one_left(point: Point, settings: Settings)
     point.folder.mkdir(parents=True)
     (point.folder / ".trials.csv-abc.part").touch()
     note = {"identity": point.identity, "attempt": 4}
-    (point.folder / "attempt.json").write_text(json.dumps(note))
+    point.write_note("attempt", note)
     attempt.run_here(point, settings, print)
     assert point.record()["attempt"] == 5
     assert {path.name for path in point.folder.iterdir()} == {
@@ -270,7 +269,7 @@ def test_death_is_recorded_once_and_only_of_a_later_attempt(point: Point) -> Non
         "ChildProcessError: the worker process was killed by SIGKILL"
     )
     assert (point.folder / "failure.json").read_bytes() == first
-    record.write_note(point, "attempt", {"identity": point.identity, "attempt": 2})
+    point.write_note("attempt", {"identity": point.identity, "attempt": 2})
     assert attempt.record_death(point, RuntimeError("another"), 1)["attempt"] == 2
     assert not (point.folder / "attempt.json").exists()
 
@@ -279,7 +278,7 @@ def test_death_says_where_its_own_attempt_was(point: Point) -> None:
     point.folder.mkdir(parents=True)
     trace = point.folder / "crash_trace.txt"
     text = "Timeout (0:00:02)!\nThread 1:\n  File x in inner\n  File y in run_in_worker\n"
-    record.write_note(point, "attempt", {"identity": point.identity, "attempt": 1})
+    point.write_note("attempt", {"identity": point.identity, "attempt": 1})
     trace.write_text(text)
     failure = attempt.record_death(point, ChildProcessError("ended with 1"), 0)
     assert (failure["reason"], failure["error"]) == ("timeout", "still running at its time limit")

@@ -9,7 +9,9 @@ from experiments.tracking.points import Point, State
 
 
 def planned(name: str) -> PlannedPoint:
-    return PlannedPoint((name,), name, Point(Path("results"), f"of {name}"), State.MISSING)
+    return PlannedPoint(
+        (name,), name, Point(Path("results"), f"of_{name}".replace(" ", "_")), State.MISSING
+    )
 
 
 def test_problem_is_told_once_with_the_points_that_have_it() -> None:
@@ -29,9 +31,9 @@ def test_failures_share_equal_tracebacks_and_have_a_line_each() -> None:
     ]
     lines = describe_failures(Outcome(failures, [planned("d")]), 9).splitlines()
     assert lines == [
-        "--- a (and 1 more): results/points/of a/log.txt",
+        "--- a (and 1 more): results/points/of_a/log.txt",
         "where",
-        "--- long name: results/points/of long name/log.txt",
+        "--- long name: results/points/of_long_name/log.txt",
         "3 of 9 points failed, and no table is written; the others are kept, and the same command "
         "runs what is missing:",
         "  raised  a          E: x",

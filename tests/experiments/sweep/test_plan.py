@@ -15,9 +15,10 @@ PLAN = [
     PlannedPoint((), f"{state} {i}", Point(Path(), f"{i}{state}"), state)
     for i in range(2)
     for state in State
+    if state is not State.SHIPPED  # never of a sweep's points
 ]
 DEFAULTS = dict.fromkeys(("only", "limit", "time_limit", "retries")) | dict.fromkeys(
-    ("force", "fail_fast", "dry_run", "mix_sources"), False
+    ("force", "fail_fast", "dry_run", "mix_sources", "replace"), False
 )
 
 

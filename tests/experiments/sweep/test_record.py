@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from hand_made import alter
 from tiny_point import computed, hopeless, planned
 
 from experiments.config.settings import Settings
 from experiments.point.run import run_point
 from experiments.point.tables import TRUTH_TABLES, table_bytes
-from experiments.sweep.record import write_failure, write_note
+from experiments.sweep.record import write_failure
 from experiments.tracking.files import csv_bytes
 from experiments.tracking.points import Point
 from experiments.tracking.store import Store
@@ -77,8 +78,7 @@ def test_point_that_is_not_whole_is_not_done(harm: str, settings: Settings, tmp_
     elif harm == "missing":
         (point.folder / "trials.csv").unlink()
     else:
-        path = point.folder / "record.json"
-        path.write_text(json.dumps(json.loads(path.read_text()) | {"source": "edited"}))
+        alter(point.folder / "record.json", source="edited")
     assert not planned(settings, tmp_path).is_done()
 
 
@@ -103,7 +103,7 @@ def point(tmp_path: Path) -> Point:
 def test_failure_counts_the_time_of_its_own_attempt(point: Point) -> None:
     started = (datetime.now(UTC) - timedelta(seconds=90)).isoformat()
     note = {"identity": point.identity, "attempt": 2, "started": started}
-    write_note(point, "attempt", note)
+    point.write_note("attempt", note)
     write_failure(point, "died", "killed", "where", 2)
     failure = point.failure()
     assert 90 <= failure.pop("seconds") < 100
@@ -112,12 +112,12 @@ def test_failure_counts_the_time_of_its_own_attempt(point: Point) -> None:
         "error": "killed", "traceback": "where", "started": started,
     }  # fmt: skip
     assert point.note("attempt") is None
-    write_note(point, "attempt", note)
+    point.write_note("attempt", note)
     write_failure(point, "died", "killed", "", 3)  # it did not get as far as its own note
     assert (point.failure()["started"], point.failure()["seconds"]) == (None, None)
 
 
 def test_note_with_a_number_that_json_lacks_is_refused(point: Point) -> None:
     with pytest.raises(ValueError, match="JSON"):
-        write_note(point, "record", {"seconds": float("nan")})
+        point.write_note("record", {"seconds": float("nan")})
     assert not list(point.results.rglob("record.json"))

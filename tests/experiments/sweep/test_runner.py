@@ -1,6 +1,5 @@
 """Running points to the end, with a launcher that only says how each ended."""
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,9 +22,12 @@ def planned(results: Path, name: str, state: State = State.MISSING) -> PlannedPo
 
 def write(point: Point, name: str, attempt: int) -> None:
     """The note that ends an attempt."""
-    note = {"identity": point.identity, "source": point.source, "attempt": attempt, "files": {}}
-    note |= {"reason": "raised", "error": "of its own"} if name == "failure" else {}
-    (point.folder / f"{name}.json").write_text(json.dumps(note))
+    note = {"identity": point.identity, "source": point.source, "attempt": attempt}
+    if name == "failure":
+        note |= {"reason": "raised", "error": "of its own"}
+    else:
+        note |= {"config": point.config, "files": {}, "stages": {}, "git": {"diff": None}}
+    point.write_note(name, note)
 
 
 class Launcher:

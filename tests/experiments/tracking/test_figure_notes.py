@@ -11,8 +11,10 @@ from experiments.tracking.figure_notes import concerns, figure_note, sentence, w
 from experiments.tracking.study import Collated, write_collated
 
 COLLATED = Collated(
-    points=("aa", "bb"),
+    points=("aa" * 16, "bb" * 16),
     sources={"1234": 2},
+    systems=("mlci.systems",),
+    made_by="5678",
     commits=("0123456789abcdef",),
     dirty=False,
     started=("2026-01-01T00:00:00", "2026-01-02T00:00:00"),
@@ -84,10 +86,12 @@ def test_sentence_names_points_commit_and_date(tmp_path: Path) -> None:
     assert sentence(tmp_path) == f"study {tmp_path.name}, whose points are not listed"
     write_collated(tmp_path, COLLATED)
     assert sentence(tmp_path) == (
-        f"study {tmp_path.name}, 2 points (digest 80c0d5c71378), "
+        f"study {tmp_path.name}, 2 points (digest cc740c0404dd), "
         "git commit 0123456789ab, data of 2026-01-02T00:00:00"
     )
-    write_collated(tmp_path, dataclasses.replace(COLLATED, points=("aa",), dirty=True, commits=()))
+    write_collated(
+        tmp_path, dataclasses.replace(COLLATED, points=("aa" * 16,), dirty=True, commits=())
+    )
     assert ", 1 point (digest " in sentence(tmp_path)
     assert "git commit unknown, with changes, data of" in sentence(tmp_path)
 

@@ -38,7 +38,7 @@ def test_new_file_takes_the_place_of_the_old_one_at_the_end_only(
         assert path.read_bytes() == b"old"
         assert Path(file.name).name.startswith(".file-")
         assert Path(file.name).name.endswith(PART)
-    assert order == ["fsync", "replace"]
+    assert order == ["fsync", "replace", "fsync"]  # the file, then its name
     assert path.read_bytes() == b"new"
     assert path.stat().st_mode & 0o777 == 0o644
     assert list(path.parent.iterdir()) == [path]

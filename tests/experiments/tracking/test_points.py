@@ -1,6 +1,5 @@
 """What a point on disk is, and what its files say about it; no science is needed for that."""
 
-import json
 import subprocess
 import sys
 import time
@@ -34,15 +33,16 @@ def point(tmp_path: Path) -> Point:
 def write(point: Point, name: str, **content: Any) -> None:
     """A note of a point as an attempt leaves it."""
     point.folder.mkdir(parents=True, exist_ok=True)
-    note = {"identity": point.identity, "source": point.source, **content}
-    (point.folder / f"{name}.json").write_text(json.dumps(note))
+    point.write_note(name, {"identity": point.identity, "source": point.source, **content})
 
 
 def finish(point: Point, **changes: Any) -> None:
     """A record of one table."""
     point.folder.mkdir(parents=True, exist_ok=True)
     (point.folder / "trials.csv").write_bytes(b"trial\n")
-    write(point, "record", files={"trials.csv": digest(b"trial\n")}, config=CONFIG, **changes)
+    files = {"trials.csv": digest(b"trial\n")}
+    content = {"files": files, "config": CONFIG, "stages": {}, "git": {"diff": None}}
+    write(point, "record", **{**content, **changes})
 
 
 @pytest.mark.parametrize(

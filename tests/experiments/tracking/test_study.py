@@ -12,17 +12,20 @@ from experiments.tracking.study import (
     StudyError,
     collated,
     read_study,
+    table_source,
     whole_study,
     write_collated,
     write_plan,
 )
 
 EXAMPLES = {"example_ranking": {"dt": 0.25, "truth": ["c1", "c2"]}}
+X, Y = "1" * 32, "2" * 32
 RECORD = {
     "started": "2026-01-02",
     "python": "3.11",
     "packages": {"numpy": "2.0", "pebble": None},
     "source": "b",
+    "config": {"system": {"target": "mine.System"}},
     "git": {"commit": "c" * 40, "dirty": False},
     "seconds": {"total": 1.26},
     "peak_memory_mb": 100,
@@ -36,13 +39,15 @@ def of_records(tables: dict[str, str]) -> Collated:
     """What tables came from, of two points."""
     first = {**RECORD, "git": {"commit": None, "dirty": True}, "started": "2026-01-03"}
     second = {**RECORD, "source": "a", "seconds": {"total": 2.0}, "peak_memory_mb": 90}
-    return collated({"y": first, "x": second}, tables)
+    return collated({Y: first, X: second}, tables)
 
 
 def test_tables_come_from_all_records() -> None:
-    assert of_records({"summary.csv": "0"}) == Collated(
-        points=("y", "x"),
+    assert of_records({"summary.csv": "0" * 64}) == Collated(
+        points=(Y, X),
         sources={"a": 1, "b": 1},
+        systems=("mine",),
+        made_by=table_source(),
         commits=("c" * 40,),
         dirty=True,
         started=("2026-01-02", "2026-01-03"),
@@ -50,7 +55,7 @@ def test_tables_come_from_all_records() -> None:
         peak_memory_mb=100,
         machines=("fast, 2 cores, Linux",),
         versions=("numpy 2.0", "python 3.11"),
-        tables={"summary.csv": "0"},
+        tables={"summary.csv": "0" * 64},
     )
 
 
@@ -66,7 +71,7 @@ def test_study_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert (plan.name, plan.examples, plan.collated) == (tmp_path.name, EXAMPLES, None)
     assert json.loads((tmp_path / "study.json").read_bytes())["examples"] == EXAMPLES
     # Tables leave the plan as it is, and the next plan leaves them.
-    tables = of_records({"summary.csv": "0"})
+    tables = of_records({"summary.csv": "0" * 64})
     write_collated(tmp_path, tables)
     assert read_study(tmp_path) == dataclasses.replace(plan, collated=tables)
     write_plan(tmp_path, [(points[1], ["dt=0.25"])])
@@ -75,14 +80,9 @@ def test_study_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert again.collated == tables
 
 
-def test_study_of_before_examples_has_none(tmp_path: Path) -> None:
-    (tmp_path / "study.json").write_text(json.dumps({"points": {}, "collated": None}))
-    assert read_study(tmp_path).examples == {}
-
-
 def test_tables_without_a_plan_list_their_points(tmp_path: Path) -> None:
     write_collated(tmp_path, of_records({}))
-    assert read_study(tmp_path).points == {"y": (), "x": ()}
+    assert read_study(tmp_path).points == {Y: (), X: ()}
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "{}", '{"points": {}, "collated": {"points": []}}'])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from html.parser import HTMLParser
 from itertools import product
@@ -14,6 +13,8 @@ import pytest
 from scipy import stats
 
 from experiments.config.paths import CHECKOUT
+from experiments.tracking.files import digest
+from experiments.tracking.sealed import write_sealed
 from paper_figures.report import __main__ as command_line
 from paper_figures.report import (
     claim_1,
@@ -122,8 +123,9 @@ def write(folder: Path, study: str, **tables: pd.DataFrame) -> None:
     (folder / study / "tables").mkdir(parents=True, exist_ok=True)
     for name, table in tables.items():
         table.to_csv(folder / study / "tables" / f"{name}.csv", index=False)
+    paths = (folder / study / "tables").iterdir()
     collated = {
-        "points": ["b", "a"],
+        "points": ["b" * 32, "a" * 32],
         "sources": {"5f" * 32: 2},
         "commits": ["c0ffee" * 6],
         "dirty": False,
@@ -132,9 +134,11 @@ def write(folder: Path, study: str, **tables: pd.DataFrame) -> None:
         "peak_memory_mb": 123,
         "machines": ["a machine"],
         "versions": ["numpy 0.1"],
-        "tables": {},
+        "systems": ["mlci.systems"],
+        "made_by": "",
+        "tables": {path.name: digest(path.read_bytes()) for path in paths},
     }
-    (folder / study / "study.json").write_text(json.dumps({"points": {}, "collated": collated}))
+    write_sealed(folder / study / "study.json", {"points": {}, "collated": collated})
 
 
 @pytest.fixture
@@ -491,8 +495,8 @@ def test_what_is_not_there_is_told_with_its_command(results: Results) -> None:
 
 def test_the_report_says_where_it_comes_from(results: Results) -> None:
     text = report(results)
-    # Of "b\na", as sha256sum prints it.
-    assert "| paper | 2 | `c4a78e5bdf31` |" in text
+    # Of the lines b...b and a...a, as sha256sum prints it.
+    assert "| paper | 2 | `efe6e6eaab79` |" in text
     assert "Machines: a machine." in text
     assert "Versions: numpy 0.1." in text
     assert "60 s" in text
@@ -512,16 +516,18 @@ class Links(HTMLParser):
 
 
 def test_the_page_is_one_file_with_everything_in_it(tmp_path: Path) -> None:
-    (tmp_path / "a.png").write_bytes(b"\x89PNG")
+    folder = tmp_path / "paper"
+    folder.mkdir()
+    (folder / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n")
     text = (
         f"# Title\n\n{markdown.contents(['Claim 1: a, b & c'])}\n## Claim 1: a, b & c\n\n"
         f"| a | b |\n| --- | ---: |\n| x | 1 |\n\n"
         f"{markdown.figure('a.png', 3, 'A caption.')}\n<b>&\n"
     )
     parser = Links()
-    content = page.html(text, tmp_path)
+    content = page.html(text, folder)
     parser.feed(content)
-    assert parser.found == ["#claim-1-a-b--c", "data:image/png;base64,iVBORw=="]
+    assert parser.found == ["#claim-1-a-b--c", "data:image/png;base64,iVBORw0KGgo="]
     assert '<h2 id="claim-1-a-b--c">' in content
     assert "<figcaption>Figure 3: A caption.</figcaption>\n</figure>" in content
     assert {"table", "h1", "img", "title"} <= set(parser.tags)
@@ -543,10 +549,11 @@ def test_the_command_writes_two_files_and_no_other(
     monkeypatch.setattr("sys.argv", ["paper_figures.report"])
     assert command_line.main() == 0
     paths = [results.folder / "paper" / name for name in ("REPORT.md", "REPORT.html")]
+    note = results.folder / "paper" / "report.json"
     assert paths[0].read_text() == report(results)
     assert capsys.readouterr().out == "".join(f"written: {path}\n" for path in paths)
     after = files(results.folder)
-    assert set(after) - set(before) == set(paths)
+    assert set(after) - set(before) == {*paths, note}
     assert {path: after[path] for path in before} == before
     assert readme.read_bytes() == text
     monkeypatch.setattr("sys.argv", [*sys.argv, "--results", str(results.folder / "none")])
