@@ -21,13 +21,13 @@ paper: $(READY) ## run what is missing of the report's studies, draw their figur
 	@$(MAKE) --no-print-directory figures
 
 study-%: $(READY)
-	@bash -o pipefail -c '$(BIN)/python experiments/run.py -m experiment=$* workers=$(HALF) 2>&1 \
+	@bash -o pipefail -c '$(BIN)/python experiments/run.py -m experiment=$* workers=$(HALF) sweep.replace=true 2>&1 \
 		| (trap "" INT; awk "{ print \"$*: \" \$$0; fflush() }")'
 
 studies: $(READY) ## run what is missing of all other studies, and draw their figures
 	@set -e; for each in $(OTHERS); do \
 		echo "=== study $$each"; \
-		$(BIN)/python experiments/run.py -m experiment=$$each; \
+		$(BIN)/python experiments/run.py -m experiment=$$each sweep.replace=true; \
 		$(BIN)/python -m paper_figures $$each; \
 	done
 
@@ -42,7 +42,7 @@ smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
 	@set -e; for each in $(STUDIES) $(OTHERS); do \
 		echo "=== study $$each"; \
 		$(BIN)/python experiments/run.py -m experiment=$$each scale=smoke study=$$each \
-			results=$(CURDIR)/results/smoke; \
+			sweep.replace=true results=$(CURDIR)/results/smoke; \
 	done
 	$(BIN)/python -m paper_figures --results results/smoke $(STUDIES) $(OTHERS)
 	$(BIN)/python -m paper_figures.report --results results/smoke

@@ -52,7 +52,7 @@ _EXAMPLES = {
         "31402d --out /tmp/recorded",
     ),
     "clean": ("", "--yes", "--results results/smoke"),
-    "empty-trash": ("", "--results results/smoke"),
+    "empty-trash": ("", "--results results/smoke", "--results /tmp/results"),
 }
 
 
