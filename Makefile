@@ -11,10 +11,13 @@ OTHERS := $(filter-out $(STUDIES) smoke,$(basename $(notdir $(wildcard conf/expe
 # share or writes its tables, the other computes.
 HALF := $(shell echo $$(( ($$(getconf _NPROCESSORS_ONLN) + 1) / 2 )))
 
-.PHONY: help paper studies figures report smoke test stress lint benchmark lock
+.PHONY: help install paper studies figures report smoke test stress lint benchmark lock
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+install: $(READY) ## install mlci and what it needs in .venv
+	@echo "installed: try $(BIN)/python experiments/infer.py demonstrations=FOLDER"
 
 paper: $(READY) ## run what is missing of the report's studies, draw their figures, write the report
 	@$(MAKE) --no-print-directory --keep-going --jobs=2 $(STUDIES:%=study-%)

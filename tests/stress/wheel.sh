@@ -31,6 +31,11 @@ if grep 'not up to date' "$work/status"; then exit 1; fi
 for table in trials ranks summary; do [ -s "results/smoke/tables/$table.csv" ]; done
 [ -s results/smoke/figures/rank_curve.pdf ]
 [ -s results/paper/REPORT.html ]
+point=$(basename "$(find results/points -mindepth 1 -maxdepth 1 | head -n 1)")
+mlci-results page "$point" --out "$work/point.html"
+mlci-results demonstrations "$point" --out "$work/recorded"
+mlci-infer demonstrations="$work/recorded" inference.calibrate=false
+for page in "$work/point.html" results/inference/*/page.html; do grep -q '<svg viewBox' "$page"; done
 python - results/points/*/record.json <<'EOF'
 import json, sys
 import experiments
