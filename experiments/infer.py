@@ -20,12 +20,13 @@ import pandas as pd
 import mlci.preparation
 from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
-from experiments.config.read import ConfigError, read_recorded_config, writable_results
+from experiments.config.read import read_recorded_config, writable_results
 from experiments.config.settings import ESTIMATE, RecordedSettings
 from experiments.console import answer_lines, diagnosis_lines
 from experiments.page.document import page
 from experiments.point.forecasts import recorded_calibration
 from experiments.point.ranking_tables import ranking_table
+from experiments.point.recorded import plausibilities, read_recordings, together
 from experiments.point.truth_tables import dimension_table
 from experiments.progress import begin, steps_shown
 from experiments.terminal import entry
@@ -38,10 +39,9 @@ from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
 from mlci.inference import Inference
-from mlci.maxent import ROUNDED_TIMES
-from mlci.recordings.read import Readings, read_demonstrations
+from mlci.recordings.plausibility import Plausibility, summary
+from mlci.recordings.read import Readings
 from mlci.recordings.recording import Remark
-from mlci.recordings.times import refuse_long
 from mlci.tabular import TabularModel, discretize
 from mlci.temperature import estimate_temperature
 from paper_figures import hypothesis_map
@@ -57,8 +57,8 @@ def main() -> int:
     """Run the command line.
 
     Returns:
-        0 if every file was used, 1 if some could not be, 2 if nothing was done: the config is
-        wrong, or no file could be used; 130 after Ctrl-C.
+        0 if every file was used, 1 if some or all could not be, 2 if nothing was done because the
+        config is wrong; 130 after Ctrl-C.
     """
     return run_command("infer", lambda tree: infer(read_recorded_config(tree)))
 
@@ -68,16 +68,20 @@ def infer(settings: RecordedSettings) -> int:
     """Rank the hypotheses, print the result and save it; returns the exit status."""
     space = settings.model.space
     begin("reading files")
-    readings = _read(settings)
+    readings = read_recordings(settings)
     demonstrations, problems, notes = readings
     begin("")
     for problem in problems:
         print(f"not used: {problem}", file=sys.stderr)
-    for line in _together(notes):
+    for line in together(notes):
         print(f"note: {line}", file=sys.stderr)
     if not demonstrations:
-        raise ConfigError("demonstrations: no file could be used; see above")
+        print(f"no demonstration could be used: {len(problems)} lack what is named above")
+        return FAILED
     results = writable_results(settings)
+    checks = plausibilities(settings, demonstrations)
+    for line in _doubt_lines(checks):
+        print(line)
     begin("forming the tabular model")
     model = _tabular_model(settings)
     calibration = None
@@ -113,6 +117,7 @@ def infer(settings: RecordedSettings) -> int:
         round_horizon=True,
         exact_ends=exact_ends,
         temperature=temperature,
+        doubts=summary(checks),
     )
     begin("")
     for line in answer_lines(result, settings.top):
@@ -131,54 +136,15 @@ def infer(settings: RecordedSettings) -> int:
     for line in diagnosis_lines(diagnosis, space.names, unreachable, count):
         print(line)
     begin("drawing the map")
-    folder = _save(settings, demonstrations, problems, result, ranking)
+    folder = _save(settings, demonstrations, problems, result, ranking, checks)
+    doubtful = [check for check in checks if check.doubts]
     concerns = list(diagnosis.concerns(space.names, unreachable, count))
-    content = _page(settings, readings, result, calibration, concerns)
+    content = _page(settings, readings, result, calibration, doubtful, concerns)
     replace_file(folder / "page.html", content)
     begin("")
     print(f"written: {folder}")
     print(f"page: {folder / 'page.html'}")
     return FAILED if problems else DONE
-
-
-def _read(settings: RecordedSettings) -> Readings:
-    """The demonstrations that can be used, what is wrong with other files, and what was assumed."""
-    readings = read_demonstrations(
-        settings.demonstrations,
-        settings.model,
-        dt=settings.recorded_dt,
-        columns=settings.columns,
-        units=settings.units,
-        time_unit=settings.time_unit,
-        start=settings.start,
-        goal=None if settings.goal is None else settings.goal.box(),
-        max_memory=settings.max_memory,
-    )
-    usable, dt = [], settings.dt
-    for demonstration in readings.demonstrations:
-        duration, name = demonstration.task.horizon, demonstration.name
-        try:
-            refuse_long(duration, dt, settings.max_duration)
-        except ValueError as error:
-            readings.problems.append(Remark(name, str(error)))
-            continue
-        usable.append(demonstration)
-        steps = max(1, round(duration / dt))
-        if abs(duration / dt - steps) > ROUNDED_TIMES:
-            message = f"its {duration:g} s count as {steps} steps of {dt:g} s, {steps * dt:g} s"
-            readings.notes.append(Remark(name, message))
-    return readings._replace(demonstrations=usable)
-
-
-def _together(remarks: Sequence[Remark]) -> list[str]:
-    """Remarks as lines, those of the same words in one."""
-    files: dict[str, list[str]] = {}
-    for remark in remarks:
-        files.setdefault(remark.message, []).append(remark.file)
-    return [
-        f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {message}"
-        for message, names in files.items()
-    ]
 
 
 def _tabular_model(settings: RecordedSettings) -> TabularModel:
@@ -192,6 +158,14 @@ def _tabular_model(settings: RecordedSettings) -> TabularModel:
         settings.transition.samples,
         settings.temperature,
     )
+
+
+def _doubt_lines(checks: Sequence[Plausibility]) -> list[str]:
+    """A paragraph for each recording that is doubtful, and how many are not."""
+    doubtful = [check for check in checks if check.doubts]
+    lines = [line for check in doubtful for line in entry("doubtful", str(check), hang=2)]
+    good = len(checks) - len(doubtful)
+    return lines + entry("recordings", f"{good} of {len(checks)} are plausible")
 
 
 def _refutation_lines(inference: Inference) -> list[str]:
@@ -213,6 +187,7 @@ def _save(
     problems: Sequence[Remark],
     result: Answer,
     ranking: pd.DataFrame,
+    checks: Sequence[Plausibility],
 ) -> Path:
     """Write tables, map and record into a folder of their own, named by what went in."""
     space = settings.model.space
@@ -228,7 +203,8 @@ def _save(
     for name, table in tables.items():
         replace_file(folder / f"{name}.csv", csv_bytes(table))
     save(hypothesis_map.draw(ranking, paths, dimension_table(space)), folder / "map")
-    replace_file(folder / "answer.json", _json_bytes(result.record()))
+    answer_record = {**result.record(), "recordings": [each.record(space) for each in checks]}
+    replace_file(folder / "answer.json", _json_bytes(answer_record))
     record = {
         **made_from,
         "demonstrations": settings.demonstrations,
@@ -244,6 +220,7 @@ def _page(
     readings: Readings,
     result: Answer,
     calibration: Calibration | None,
+    doubtful: Sequence[Plausibility],
     concerns: Sequence[str],
 ) -> bytes:
     """The page, with what reading the files assumed and all that is doubtful."""
@@ -254,10 +231,14 @@ def _page(
         readings.demonstrations,
         title=f"What was avoided: {', '.join(sources)}",
         assumed=[
-            *_together(readings.notes),
+            *together(readings.notes),
             *([] if calibration is None else [calibration.summary()]),
         ],
-        doubtful=[*concerns, *(f"not used: {problem}" for problem in readings.problems)],
+        doubtful=[
+            *map(str, doubtful),
+            *concerns,
+            *(f"not used: {problem}" for problem in readings.problems),
+        ],
     ).encode(errors="backslashreplace")
 
 

@@ -38,6 +38,7 @@ class Answer:
         temperature: of the tabular model.
         exact_ends: whether its trajectories begin and end at states, not at cells.
         temperature_estimate: the temperature that the demonstrations look like, if it is known.
+        doubts: about the recordings themselves, such as `mlci.recordings.plausibility.summary`.
     """
 
     inference: Inference
@@ -48,6 +49,7 @@ class Answer:
     temperature: float
     exact_ends: bool
     temperature_estimate: TemperatureEstimate | None = None
+    doubts: tuple[str, ...] = ()
 
     @property
     def assumptions(self) -> list[str]:
@@ -120,8 +122,11 @@ class Answer:
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader should know before believing the answer, those of the inference first."""
-        phrases, names = list(self.inference.warnings), np.array(self.inference.names, dtype=object)
+        """What a reader should know before believing the answer, those of the recordings first."""
+        phrases, names = (
+            [*self.doubts, *self.inference.warnings],
+            np.array(self.inference.names, dtype=object),
+        )
         if rare := names[self.misfit.is_rare].tolist():
             phrases.append(
                 f"the tabular model finds {len(rare)} of {len(names)} demonstrations nearly "
@@ -156,6 +161,7 @@ def answer(
     exact_ends: bool = True,
     samples: int = SAMPLES,
     temperature: TemperatureEstimate | None = None,
+    doubts: Sequence[str] = (),
 ) -> Answer:
     """Look at an inference from all sides.
 
@@ -168,6 +174,7 @@ def answer(
         exact_ends: as of `infer`.
         samples: as of `misfit`.
         temperature: what `mlci.temperature.estimate_temperature` made of the demonstrations.
+        doubts: about the recordings themselves.
     """
     distributions = (
         TrajectoryDistribution.of_task(
@@ -190,6 +197,7 @@ def answer(
         temperature=model.temperature,
         exact_ends=exact_ends,
         temperature_estimate=temperature,
+        doubts=tuple(doubts),
     )
 
 

@@ -33,7 +33,7 @@ MLCI = {
     "mlci.ilqr": "mlci.riccati",
     "mlci.demonstrations": "mlci.spaces",
     "mlci.demonstrator": "mlci.demonstrations mlci.ilqr mlci.safety_filter mlci.simulate",
-    "mlci.recordings": "mlci.demonstrations mlci.systems",
+    "mlci.recordings": "mlci.crossings mlci.demonstrations mlci.systems",
     "mlci.planes": "mlci.regions",
     "mlci.merged_moves": "mlci.spaces",
     "mlci.tabular": "mlci.merged_moves mlci.regions mlci.simulate",

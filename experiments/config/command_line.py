@@ -10,7 +10,7 @@ from pathlib import Path
 from experiments.config.paths import CONF, is_inside_checkout
 from experiments.config.problems import ConfigError
 
-PATHS = ("demonstrations", "results")  # keys whose values are paths
+PATHS = ("demonstrations", "results", "tasks")  # keys whose values are paths
 
 
 def command_words(words: Sequence[str]) -> list[str]:

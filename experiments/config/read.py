@@ -95,7 +95,11 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
         ConfigError: listing every problem.
     """
     # How demonstrations are made, which a system brings, plays no part.
-    settings = checked(RecordedSettings, _without(tree, ("tasks", "safety", "truth")))
+    table = tree.get("tasks")
+    used = _without(tree, ("tasks", "safety", "truth"))
+    settings = checked(
+        RecordedSettings, {**used, "tasks": None if isinstance(table, Mapping) else table}
+    )
     _refuse(shape_problems(settings), recorded_shape_problems(settings))
     _refuse(size_problems(settings))
     return settings

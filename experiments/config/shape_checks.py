@@ -56,6 +56,12 @@ def recorded_shape_problems(settings: RecordedSettings) -> Iterator[str]:
         yield from _length_problems("start", settings.start, space)
     if settings.goal is not None:
         yield from _region_problems("goal", settings.goal, space, point=True)
+    for name, of in (settings.derive or {}).items():
+        if name == of or not {name, of} <= set(space.names):
+            yield (
+                f"derive: {{{name}: {of}}} is no state ({', '.join(space.names)}) as the "
+                f"derivative of another; an example is {{{space.names[-1]}: {space.names[0]}}}"
+            )
 
 
 def _reality_problems(settings: Settings) -> Iterator[str]:

@@ -10,6 +10,7 @@ from mlci.recordings.table import Wants
 from mlci.systems import System
 
 STATES = "states"  # an array of all states, (K+1, n)
+TRIALS = ("trial", "trial id", "episode", "episode index", "track", "track id", "trackId", "id")
 TIMES = ("time", "timestamp", "t")  # names of time, the first that is there
 GOAL = ("goal_lower", "goal_upper")
 _BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()]*?(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]\s*$")
@@ -62,6 +63,7 @@ def wanted(system: System, layout: Layout) -> Wants:
     """Which arrays of a file are loaded: those that may be used."""
     names = {
         *TIMES,
+        *TRIALS,
         "dt",
         STATES,
         "controls",

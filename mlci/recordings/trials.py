@@ -1,115 +1,180 @@
-"""From a recording to the trials in it, and from a trial to a demonstration."""
+"""Several trials in one file: columns name them, or time starts again."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
-from mlci.demonstrations import Demonstration, Task
-from mlci.recordings.columns import control_columns
-from mlci.recordings.named import box_of
-from mlci.recordings.recording import Recording, goal_columns
-from mlci.recordings.times import rising
-from mlci.spaces import Box, Floats, StateSpace
-from mlci.systems import System
+from mlci.recordings.columns import shortened
+from mlci.recordings.recording import Recording
+from mlci.spaces import Floats, Ints
+
+_BACK = 0.5  # of a trial so far: a step back in time of more starts another
+_MOST_SHOWN = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """The samples of one trial: rows of a recording's frame, under their numbers there."""
+    """The rows of one trial.
+
+    Attributes:
+        name: what tells it from the other trials of its file; "" where it is the only one.
+        frame: its rows of `Recording.frame`, in the file's order.
+    """
 
     name: str
-    recording: Recording
     frame: pd.DataFrame
 
 
-def split(recording: Recording, name: str) -> list[Trial]:
-    """The trials of a recording."""
-    return [Trial(name, recording, recording.frame)]
-
-
-def demonstration_of(
-    trial: Trial,
-    system: System,
-    start: ArrayLike | None,
-    goal: Box | None,
-    tolerance: float,
-) -> Demonstration:
-    """Check a trial and make it a demonstration.
+def split_trials(recording: Recording, group_by: Sequence[str]) -> tuple[list[Trial], list[str]]:
+    """The trials of a file, and what was assumed to tell them apart.
 
     Args:
-        trial: the trial.
-        system: the system.
-        start: (n,) first state; None takes the first sample.
-        goal: goal; None takes what the file says, or else the last sample.
-        tolerance: how far it may begin from `start` or end from `goal`.
+        recording: the file, whose frame has the columns of `group_by`.
+        group_by: columns whose values name a trial together; with none, time that starts again
+            starts another trial. It does so within a trial of `group_by` as well.
 
     Raises:
-        ValueError: what is wrong with it, and where.
+        ValueError: time that goes forth and back, as where several trials interleave.
     """
-    space, frame, recording = system.space, trial.frame, trial.recording
-    if len(frame) < 2:
-        raise ValueError(f"has {len(frame)} sample(s): a demonstration needs at least 2")
-    states = frame[list(space.names)].to_numpy(dtype=float)
-    _refuse_states(trial, states, space)
-    times = rising(
-        frame["time"].to_numpy(dtype=float),
-        recording.time_resolution,
-        lambda sample: recording.place(int(frame.index[sample])),
-    )
-    states = space.unwrap(states)
-    first = states[0].copy() if start is None else np.asarray(start, dtype=float)
-    away = space.difference(states[0], first)
-    states = states - (states[0] - first - away)  # whole turns, exactly 0 for its own start
-    region = goal or _goal(trial, space) or Box.point(states[-1])
-    for word, distance in (
-        ("begins", np.linalg.norm(away)),
-        ("ends", np.linalg.norm(space.excess(states[-1], region))),
-    ):
-        if distance > tolerance:
-            end = "start" if word == "begins" else "goal"
-            raise ValueError(
-                f"{word} {distance:.3g} away from the {end} that was given, more than "
-                f"{tolerance:g}: leave the {end} out to take it off the file"
-            )
-    task = Task(first, region, float(times[-1]))
-    return Demonstration(task, states, _controls(trial, system), times, trial.name)
+    frame, notes = recording.frame, list[str]()
+    if missing := [name for name in group_by if name not in frame]:
+        others = shortened([*map(str, recording.table.columns.columns), *recording.table.others])
+        raise ValueError(f"has no column {' or '.join(missing)} for group_by, but {others}")
+    groups = [("", frame)]
+    if group_by:
+        keys = _texts(frame, group_by)
+        unnamed = keys == ""
+        if unnamed.any():
+            notes.append(f"{int(unnamed.sum())} rows without {' or '.join(group_by)} are left out")
+        names = pd.unique(keys[~unnamed])
+        groups = [(name, frame[(keys == name).to_numpy()]) for name in names]
+        if not groups:
+            raise ValueError(f"has no row with a value of {' and '.join(group_by)}")
+    trials = []
+    for name, rows in groups:
+        parts = _parts(rows, fewest=2 if group_by else 3)
+        if len(parts) == 1:
+            trials.append(Trial(name, rows))
+            continue
+        column = None if group_by else _naming_column(recording, parts)
+        if not parts or not (group_by or column or not _id_columns(recording)):
+            raise ValueError(_interleaved(recording, rows, is_grouped=bool(group_by)))
+        labels = [str(number + 1) for number in range(len(parts))]
+        if column is not None:
+            labels = [_text(recording.table.columns[column].loc[part.index[0]]) for part in parts]
+        trials += [
+            Trial("_".join(filter(None, [name, label])), part)
+            for label, part in zip(labels, parts, strict=True)
+        ]
+        places = _shown([recording.place(part.index[0], "time") for part in parts[1:]])
+        by = "" if column is None else f", named by column {column!r}"
+        notes.append(f"time starts again at {places}: {len(parts)} trials{by}")
+    if group_by and len(trials) > 1:
+        notes.append(f"{len(trials)} trials by {' and '.join(group_by)}")
+    return trials, notes
 
 
-def _refuse_states(trial: Trial, states: Floats, space: StateSpace) -> None:
-    """Refuse states (K+1, n) that are no numbers, or outside the space."""
-    for bad, reason in (
-        (~np.isfinite(states), "is not a finite number: remove or repair the sample"),
-        (
-            ~space.periodic & ((states < space.bounds.lower) | (states > space.bounds.upper)),
-            "leaves the state space: widen its bounds in the configuration or drop the file",
-        ),
-    ):
-        if bad.any():
-            sample, d = (int(index) for index in np.argwhere(bad)[0])
-            name = space.names[d]
-            place = trial.recording.place(int(trial.frame.index[sample]), name)
-            raise ValueError(
-                f"{place}: {name} = {states[sample, d]:g} {reason} "
-                f"(bounds {space.bounds.lower[d]:g} to {space.bounds.upper[d]:g})"
-            )
+def _parts(rows: pd.DataFrame, fewest: int) -> list[pd.DataFrame]:
+    """The rows of a trial, or of several where time starts again; none where that is unclear."""
+    starts = _restarts(rows["time"].to_numpy(dtype=float), fewest)
+    if starts is None:
+        return []
+    edges = [*starts.tolist(), len(rows)]
+    return [rows.iloc[first:last] for first, last in pairwise(edges)]
 
 
-def _controls(trial: Trial, system: System) -> Floats | None:
-    """Controls (K, m) if there is a finite one for every sample but the last, else None."""
-    names = control_columns(system)
-    if not set(names) <= set(trial.frame.columns):
+def _interleaved(recording: Recording, rows: pd.DataFrame, *, is_grouped: bool) -> str:
+    """What is wrong with time that goes forth and back, and which column may help."""
+    time = rows["time"].dropna()
+    place = recording.place(time.index[1:][(np.diff(time) <= 0)][0], "time")
+    hint = "group_by=COLUMN tells trials apart, by a column that names them"
+    if not is_grouped and (columns := _id_columns(recording)):
+        count = recording.table.columns[columns[0]].nunique()
+        hint = f"group_by={columns[0]} would tell {count} trials apart"
+    return f"{place}: time goes forth and back, as where several trials interleave: {hint}"
+
+
+def _restarts(time: Floats, fewest: int) -> Ints | None:
+    """Numbers of the samples at which a trial starts, the first among them; None if it is unclear.
+
+    One small step back is left in its trial: whoever needs rising times names it. Trials of fewer
+    samples than `fewest`, in the median, are none.
+    """
+    known = np.flatnonzero(np.isfinite(time))
+    starts, begin, latest, small = [0], np.nan, -np.inf, 0
+    for k, moment in zip(known.tolist(), time[known].tolist(), strict=True):
+        if np.isnan(begin):
+            begin = moment
+        elif moment <= latest:
+            if latest > begin and latest - moment > _BACK * (latest - begin):
+                starts.append(k)
+                begin, latest = moment, -np.inf
+            else:
+                small += 1
+        latest = max(latest, moment)
+    sizes = np.diff([*starts, len(time)])
+    if small > 1 or (len(starts) > 1 and np.median(sizes) < fewest):
         return None
-    held = trial.frame[names].to_numpy(dtype=float)[:-1]
-    return held if np.all(np.isfinite(held)) else None
+    return np.array(starts)
 
 
-def _goal(trial: Trial, space: StateSpace) -> Box | None:
-    """The goal that the file states: in the trial's first line, or once for all."""
-    names = goal_columns(space)
-    if not set(names) <= set(trial.frame.columns):
-        return trial.recording.goal
-    return box_of(trial.frame[names].iloc[0].to_numpy(dtype=float).reshape(2, -1))
+def _naming_column(recording: Recording, parts: Sequence[pd.DataFrame]) -> str | None:
+    """A column of the file with one value in each part, and another in each."""
+    columns = recording.table.columns
+    for name in columns.columns[columns.columns.is_unique * np.ones(columns.shape[1], bool)]:
+        texts = [_texts(columns.loc[part.index], [name]) for part in parts]
+        values = [text.iloc[0] for text in texts]
+        if len(set(values)) == len(parts) and all(len(set(text)) == 1 for text in texts):
+            return str(name)
+    return None
+
+
+def _id_columns(recording: Recording) -> list[str]:
+    """Columns of the file within whose values time rises."""
+    columns, time = recording.table.columns, recording.frame["time"]
+    found = []
+    for name in pd.unique(columns.columns):
+        values = columns[name]
+        if isinstance(values, pd.DataFrame) or not _is_whole(values):
+            continue
+        keys = _texts(columns, [name])
+        if not 1 < keys.nunique() <= len(keys) / 3:
+            continue
+        steps = time.groupby(keys.to_numpy()).diff().dropna()
+        if np.all(steps > 0):
+            found.append(str(name))
+    return found
+
+
+def _is_whole(values: pd.Series[float]) -> bool:
+    """Whether values may be names: no fractions, no times."""
+    if values.dtype.kind == "f":
+        return bool(np.all(values.dropna() % 1 == 0))
+    return values.dtype.kind not in "cmM"
+
+
+def _texts(frame: pd.DataFrame, names: Sequence[str]) -> pd.Series[str]:
+    """The values of some columns in a row, joined; "" where one is missing."""
+    parts = [frame[name].map(_text) for name in names]
+    joined = parts[0]
+    for part in parts[1:]:
+        joined = (joined + "_" + part).where((joined != "") & (part != ""), "")
+    return joined
+
+
+def _text(value: object) -> str:
+    """A value as part of a trial's name: 3 for 3.0, "" for a missing one."""
+    if isinstance(value, float | np.floating):
+        return "" if np.isnan(value) else f"{value:.12g}"
+    return "" if value is None or value is pd.NA or value is pd.NaT else str(value).strip()
+
+
+def _shown(places: Sequence[str]) -> str:
+    """The first few places."""
+    more = len(places) - _MOST_SHOWN
+    return ", ".join(places[:_MOST_SHOWN]) + (f" and {more} more" if more > 0 else "")

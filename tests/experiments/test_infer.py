@@ -107,7 +107,7 @@ def test_recorded_demonstrations_are_ranked_and_saved(
 
 def test_a_bad_file_is_named_and_the_others_are_not_lost(recorded: Path) -> None:
     bad = recorded / "recorded" / "bad.csv"
-    bad.write_text("time,angle,angular_velocity\n0,1,0\n0.01,nan,0\n0.02,1,0\n")
+    bad.write_text("time,angle,angular_velocity\n0,1,0\n0.01,inf,0\n0.02,1,0\n")
     done = infer(recorded, "demonstrations=[recorded]", "grid=100", "dt=0.5")
     assert done.returncode == 1
     assert "bad.csv: line 3" in done.stderr
@@ -138,7 +138,7 @@ def test_times_in_milliseconds_are_refused_at_once(recorded: Path) -> None:
         table = pd.read_csv(path)
         table.assign(time=table["time"] * 1000).to_csv(path, index=False)
     refused = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.5")
-    assert refused.returncode == 2
+    assert refused.returncode == 1
     assert "lasts 5000 s, 10000 steps of 0.5 s: is time in ms?" in refused.stderr
     assert not (recorded / "results").exists()
     done = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.5", "time_unit=ms")
@@ -149,7 +149,6 @@ def test_times_in_milliseconds_are_refused_at_once(recorded: Path) -> None:
     ("overrides", "message"),
     [
         ([], "demonstrations: missing"),
-        (["demonstrations=nowhere"], "nowhere: there is no such file"),
         (["demonstrations=nowhere", "dtt=1"], "dtt: unknown key; did you mean dt?"),
         (["demonstrations=nowhere", "dt=0"], "dt: 0.0 must be above 0"),
         (["demonstrations=nowhere", "start=[1]"], "start: [1.0] must have 2 entries"),
@@ -164,3 +163,63 @@ def test_a_wrong_command_gets_one_clear_error(
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("content", [None, "time,angle\n0,1\n1,2\n"])
+def test_where_no_demonstration_can_be_used_each_file_is_told(
+    tmp_path: Path, content: str | None
+) -> None:
+    if content is not None:
+        (tmp_path / "a.csv").write_text(content)
+    done = infer(tmp_path, "demonstrations=a.csv")
+    assert done.returncode == 1
+    assert "no demonstration could be used: 1 lack what is named above" in done.stdout
+    lacks = "there is no such file" if content is None else "has no column angular_velocity"
+    assert f"not used: a.csv: {lacks}" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "results").exists()
+
+
+def test_trials_of_one_file_with_copies_gaps_and_doubts(
+    tmp_path: Path, shown: list[Demonstration]
+) -> None:
+    """The third is the first again, in the fourth the angle is in degrees, the last has a hole."""
+    tables = []
+    for number, which in enumerate([0, 1, 0, 2, 3]):
+        states = shown[which].states * ([180 / np.pi, 1.0] if number == 3 else 1.0)
+        table = pd.DataFrame(states, columns=list(Pendulum().space.names))
+        tables.append(table.assign(time=shown[which].times, run=f"r{number}"))
+    tables[1].loc[40, "angle"] = np.nan
+    tables[4].loc[40:90, "angle"] = np.nan
+    pd.concat(tables).sort_values("time", kind="stable").to_csv(tmp_path / "all.csv", index=False)
+    ends = shown[1].states[[0, -1]]
+    heads = ["trial", "goal_lower_angle", "goal_lower_angular_velocity"]
+    heads += [head.replace("lower", "upper") for head in heads[1:]]
+    corners = [ends[1, 0] - 0.1, -np.inf, ends[1, 0] + 0.1, np.inf]
+    pd.DataFrame([["all_r1", *corners]], columns=heads).to_csv(tmp_path / "tasks.csv", index=False)
+    words = ["demonstrations=all.csv", "grid=100", "dt=0.5", "group_by=run", "tasks=tasks.csv"]
+    done = infer(tmp_path, *words, "crossing.time=0.05")
+    assert done.returncode == 1
+    assert "all.csv, trial r4: line " in done.stderr
+    for note in (
+        "5 trials by run",
+        "all_r2: is a copy of all_r0, and is not counted",
+        "trial r1: 1 missing values of angle are bridged",
+        "tasks: has no row for all_r0, all_r2, all_r3, all_r4: start and goal are read off",
+    ):
+        assert note in done.stderr, note
+    said = " ".join(done.stdout.split())
+    assert "recordings 2 of 3 are plausible" in said
+    assert "doubtful all_r3: angle moves 57.2 times faster than angular velocity says" in said
+    folder = saved(tmp_path)
+    answer = json.loads((folder / "answer.json").read_text())
+    assert answer["crossing"] == {"depth": 0.0, "time": 0.05}
+    assert [each["name"] for each in answer["recordings"]] == ["all_r0", "all_r1", "all_r3"]
+    assert any("do not move as the dynamics allow: all_r3" in each for each in answer["warnings"])
+
+
+def test_a_table_of_tasks_that_is_none_is_a_wrong_config(recorded: Path) -> None:
+    for word in ("tasks=nowhere.csv", "tasks=recorded/trial_000.csv"):
+        done = infer(recorded, "demonstrations=recorded", "grid=100", word)
+        assert done.returncode == 2
+        assert "tasks: " in done.stderr

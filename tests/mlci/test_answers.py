@@ -150,3 +150,9 @@ def test_a_grid_that_cuts_regions_is_a_warning(result: Answer) -> None:
     neither = replace(result, unseen=result.unseen[:0], cut=np.zeros((36, 2), bool))
     others = neither.warnings[len(result.inference.warnings) :]
     assert [text for text in others if "nearly impossible" not in text] == []
+
+
+def test_doubts_about_the_recordings_come_first(result: Answer) -> None:
+    doubtful = replace(result, doubts=("1 of 3 recordings turn too far",))
+    assert doubtful.warnings == ["1 of 3 recordings turn too far", *result.warnings]
+    assert doubtful.record()["warnings"][0] == "1 of 3 recordings turn too far"

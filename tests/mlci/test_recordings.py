@@ -7,6 +7,7 @@ import pytest
 
 from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.recordings.files import FORMATS
+from mlci.recordings.paths import Repair
 from mlci.recordings.read import read_demonstrations
 from mlci.recordings.write import write_demonstration
 from mlci.simulate import euler_step, rollout
@@ -212,11 +213,12 @@ def test_start_and_goal_may_be_given(tmp_path):
         (HEADER, r"has 0 sample\(s\): a demonstration needs at least 2"),
         (HEADER + "0,1,0\n", r"has 1 sample\(s\)"),
         ("1\n2\n3\n", r"has 1 sample\(s\)"),
-        (GOOD + "0.4,nan,0.5\n", "line 6: angle = nan is not a finite number"),
-        (GOOD + "0.4,1.2,\n", "line 6: angular_velocity = nan is not a finite number"),
+        (GOOD + "0.4,nan,0.5\n0.5,1.25,1\n", "line 6: angle is missing for 0.2 s"),
+        (GOOD + "0.4,1.2,\n0.5,1.2,1\n", "line 6: angular_velocity is missing"),
+        (GOOD + "0.4,inf,0.5\n", "line 6: angle = inf is not a finite number"),
         (GOOD + "0.4,oops,0.5\n", "line 6, column 'angle': 'oops' is not a number"),
         (GOOD + "0.4,1.2\n", "line 6 has 2 values where the header has 3"),
-        (GOOD + "0.4,1.2,6.5\n", r"line 6: angular_velocity = 6\.5 leaves .*\(bounds -6 to 6\)"),
+        (GOOD + "0.4,1.2,6.5\n", r"line 6: angular_velocity = 6\.5 is outside .*\(bounds -6 to 6;"),
         (GOOD + "0.3,1.2,0.5\n", r"line 6: time goes from 0\.3 to 0\.3 s"),
         (GOOD + "nan,1.2,0.5\n", r"line 6: time goes from 0\.3 to nan s"),
         (HEADER + "0,1,0\n0,1,0\n", r"line 3: time goes from 0 to 0 s"),
@@ -228,9 +230,9 @@ def test_start_and_goal_may_be_given(tmp_path):
             "1,2\n3,4\n5,6\n7,8\n",
             r"no header and 4 lines of 2 values: it needs 2 lines .* or 3 .*time,angle,",
         ),
-        ("1,2,3\n0,nan,0\n", "line 2, column 2: angular_velocity = nan"),
+        ("1,2,3\n0,nan,0\n", "line 2, column 2: angular_velocity is missing"),
         ("1,2,3\n0,x,0\n", "line 2, column 2: 'x' is not a number"),
-        ("1,2,3\n0,0,-7\n", "line 2, column 3: angular_velocity = -7 leaves"),
+        ("1,2,3\n0,0,-7\n", "line 2, column 3: angular_velocity = -7 is outside"),
     ],
 )
 def test_what_is_wrong_with_a_text_is_named(tmp_path, text, message):
@@ -263,7 +265,8 @@ def test_bytes_that_are_no_text_are_named(tmp_path):
 
 
 def test_one_bad_file_does_not_lose_the_others(tmp_path):
-    for name, text in (("b", GOOD), ("a", "oops"), ("c", GOOD), ("d", HEADER)):
+    other = GOOD.replace("1.15", "1.16")
+    for name, text in (("b", GOOD), ("a", "oops"), ("c", other), ("d", HEADER)):
         (tmp_path / f"{name}.csv").write_text(text)
     (tmp_path / "notes.pdf").write_text("ignored in a folder")
     (tmp_path / "._b.csv").write_text("hidden")
@@ -276,8 +279,8 @@ def test_one_bad_file_does_not_lose_the_others(tmp_path):
 def test_paths_that_stand_for_nothing_twice_the_same_or_alike(tmp_path):
     (tmp_path / "other").mkdir()
     (tmp_path / "empty").mkdir()
-    for folder in (tmp_path, tmp_path / "other"):
-        (folder / "a.csv").write_text(GOOD)
+    (tmp_path / "a.csv").write_text(GOOD)
+    (tmp_path / "other" / "a.csv").write_text(GOOD.replace("1.15", "1.16"))
     names = ["none.csv", "no*.csv", "empty", "a.csv", "*.csv", "other"]
     found, problems, _ = read_demonstrations([tmp_path / name for name in names], PENDULUM)
     assert [item.name for item in found] == [
@@ -295,3 +298,18 @@ def test_paths_that_stand_for_nothing_twice_the_same_or_alike(tmp_path):
 def test_time_step_must_be_positive(tmp_path):
     with pytest.raises(ValueError, match="must be positive, not 0"):
         read_demonstrations(tmp_path, PENDULUM, dt=0)
+
+
+def test_positions_alone_are_enough_where_a_velocity_is_derived(tmp_path):
+    times = np.arange(101) / 100
+    angle = 6.0 + np.sin(2 * times)
+    for name, head in (("a", "time,angle"), ("b", "time,angle,angular_velocity")):
+        rows = [f"{t:.2f},{a % (2 * np.pi):.6f}" for t, a in zip(times, angle, strict=True)]
+        rows = [f"{row},77" if name == "b" else row for row in rows]  # a velocity that is not used
+        (tmp_path / f"{name}.csv").write_text("\n".join([head, *rows]))
+    repair = Repair(derived={"angular_velocity": "angle"})
+    found, problems, notes = read_demonstrations(tmp_path, PENDULUM, repair=repair)
+    assert problems == []
+    assert [str(note) for note in notes] == ["b: is a copy of a, and is not counted"]
+    np.testing.assert_allclose(found[0].states[:, 1], 2 * np.cos(2 * times), atol=0.01)
+    assert read_demonstrations(tmp_path, PENDULUM)[0] == []

@@ -69,14 +69,14 @@ class RecordedSettings(ModelSettings):
         ),
     ]
     columns: Annotated[
-        dict[Word, Word],
+        dict[Word, Word] | None,
         about(
             "name of a column of the files by ours, as in {angle: theta, time: t}; `states` is an "
             "array of all states. Case, units in brackets, spaces and dashes make no difference"
         ),
     ]
     units: Annotated[
-        dict[Word, Word],
+        dict[Word, Word] | None,
         about(
             "unit of a state in the files, as in {angle: deg}; else what they say, or the system's"
         ),
@@ -92,6 +92,34 @@ class RecordedSettings(ModelSettings):
         Positive, about("a demonstration that lasts longer is refused: time is in ms?", "s")
     ]
     max_memory: Annotated[Positive, about("what reading one file may take", "MB")]
+    tasks: Annotated[
+        Word | None,
+        about(
+            "table of starts and goals: columns `trial`, and `start_NAME`, or `goal_lower_NAME` "
+            "and `goal_upper_NAME`, of each dimension, or all"
+        ),
+    ]
+    group_by: Annotated[
+        one_or_list(Word, tuple[Word, ...]) | None,  # type: ignore[valid-type]
+        about(
+            "column, or list of columns, that names the trials of a file; null starts another "
+            "where time starts again"
+        ),
+    ]
+    derive: Annotated[
+        dict[Word, Word] | None,
+        about(
+            "states that are smooth derivatives of others, as in {angular_velocity: angle}, "
+            "whatever the files hold"
+        ),
+    ]
+    derive_window: Annotated[
+        Positive, about("window of the cubics that are fitted for derivatives", "s")
+    ]
+    bridge: Annotated[
+        NotNegative,
+        about("how far a path may move in a gap that a straight line bridges", "share of a cell"),
+    ]
     crossing: CrossingSettings
     estimate_temperature: Annotated[
         Flag,

@@ -1,0 +1,80 @@
+"""Recorded demonstrations as the settings say, and doubts about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from experiments.config.problems import ConfigError
+from experiments.config.settings import RecordedSettings
+from mlci.demonstrations import Demonstration
+from mlci.maxent import ROUNDED_TIMES
+from mlci.recordings.paths import Repair
+from mlci.recordings.plausibility import Plausibility, plausibility
+from mlci.recordings.read import Readings, read_demonstrations
+from mlci.recordings.recording import Remark
+from mlci.recordings.task_table import read_task_table
+from mlci.recordings.times import refuse_long
+
+
+def read_recordings(settings: RecordedSettings) -> Readings:
+    """The demonstrations that can be used, what is wrong with other files, and what was assumed.
+
+    Raises:
+        ConfigError: a table of tasks that cannot be used.
+    """
+    try:
+        tasks = settings.tasks and read_task_table(settings.tasks, settings.model.space)
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"tasks: {error}") from None
+    group_by = settings.group_by or ()
+    readings = read_demonstrations(
+        settings.demonstrations,
+        settings.model,
+        dt=settings.recorded_dt,
+        columns=settings.columns,
+        units=settings.units,
+        time_unit=settings.time_unit,
+        group_by=[group_by] if isinstance(group_by, str) else group_by,
+        repair=Repair(
+            settings.bridge * settings.cells.widths, settings.derive or {}, settings.derive_window
+        ),
+        tasks=tasks or None,
+        start=settings.start,
+        goal=None if settings.goal is None else settings.goal.box(),
+        max_memory=settings.max_memory,
+    )
+    usable, dt = [], settings.dt
+    for demonstration in readings.demonstrations:
+        duration, name = demonstration.task.horizon, demonstration.name
+        try:
+            refuse_long(duration, dt, settings.max_duration)
+        except ValueError as error:
+            readings.problems.append(Remark(name, str(error)))
+            continue
+        usable.append(demonstration)
+        steps = max(1, round(duration / dt))
+        if abs(duration / dt - steps) > ROUNDED_TIMES:
+            message = f"its {duration:g} s count as {steps} steps of {dt:g} s, {steps * dt:g} s"
+            readings.notes.append(Remark(name, message))
+    return readings._replace(demonstrations=usable)
+
+
+def plausibilities(
+    settings: RecordedSettings, demonstrations: Sequence[Demonstration]
+) -> list[Plausibility]:
+    """What is known of each recording from itself."""
+    crossing = settings.crossing.crossing()
+    return [
+        plausibility(settings.model, settings.candidates, each, crossing) for each in demonstrations
+    ]
+
+
+def together(remarks: Sequence[Remark]) -> list[str]:
+    """Remarks as lines, those of the same words in one."""
+    files: dict[str, list[str]] = {}
+    for remark in remarks:
+        files.setdefault(remark.message, []).append(remark.file)
+    return [
+        f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {message}"
+        for message, names in files.items()
+    ]
