@@ -16,7 +16,7 @@ HALF := $(shell echo $$(( ($$(getconf _NPROCESSORS_ONLN) + 1) / 2 )))
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-install: $(READY) ## install mlci and what it needs in .venv
+install: .venv/installed ## install what running needs, without tools; EXTRAS="parquet excel" reads more formats
 	@echo "installed: try $(BIN)/python experiments/infer.py demonstrations=FOLDER"
 
 paper: $(READY) ## run what is missing of the report's studies, draw their figures, write the report
@@ -72,15 +72,30 @@ lock: $(READY) ## write requirements.lock from pyproject.toml, at the newest ver
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
 		--all-extras --custom-compile-command "make lock" --output-file requirements.lock pyproject.toml
 
-# Packages without a wheel are built with the locked setuptools, which therefore comes first.
-# The stamp is written last: an installation that failed halfway is tried again.
+# Packages without a wheel are built with the locked setuptools, which therefore comes first. A stamp is
+# written last: an installation that failed halfway is tried again.
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+INSTALL := $(PIP) install --no-build-isolation
+
+define environment
+@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	echo "mlci needs Python 3.11 or newer, and $(PYTHON) is not: try make PYTHON=python3.12" >&2; \
+	exit 1; }
+$(PYTHON) -m venv .venv
+sed -n '/^setuptools==/,/# via/p' requirements.lock > .venv/setuptools.lock
+$(INSTALL) --quiet --requirement .venv/setuptools.lock
+endef
+
 $(READY): requirements.lock pyproject.toml
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
-		echo "mlci needs Python 3.11 or newer, and $(PYTHON) is not: try make PYTHON=python3.12" >&2; \
-		exit 1; }
-	$(PYTHON) -m venv .venv
-	sed -n '/^setuptools==/,/# via/p' requirements.lock > .venv/setuptools.lock
-	$(BIN)/python -m pip install --quiet --requirement .venv/setuptools.lock
-	$(BIN)/python -m pip install --quiet --no-build-isolation --requirement requirements.lock
-	$(BIN)/python -m pip install --quiet --no-build-isolation --no-deps --editable .
+	$(environment)
+	$(INSTALL) --requirement requirements.lock
+	$(INSTALL) --quiet --no-deps --editable .
+	@touch .venv/installed $@
+
+.venv/installed: requirements.lock pyproject.toml
+	$(environment)
+	$(BIN)/python .ci/needed.py $(EXTRAS) > .venv/needed.lock
+	$(INSTALL) --requirement .venv/needed.lock
+	$(INSTALL) --quiet --no-deps --editable .
+	@test -e $(READY) || $(PIP) uninstall --quiet --yes setuptools
 	@touch $@

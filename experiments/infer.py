@@ -29,7 +29,7 @@ from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import plausibilities, read_recordings, together
 from experiments.point.truth_tables import dimension_table
 from experiments.progress import begin, steps_shown
-from experiments.terminal import entry
+from experiments.terminal import counted, entry
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.store import Store
@@ -128,7 +128,7 @@ def infer(settings: RecordedSettings) -> int:
     if calibration is not None:
         for line in entry("calibration", calibration.summary()):
             print(line)
-    print(f"demonstrations  {len(demonstrations)} used, {len(problems)} files not used")
+    print(f"demonstrations  {len(demonstrations)} used, {counted(len(problems), 'file')} not used")
     for line in _refutation_lines(inference):
         print(line)
     unreachable = int(np.sum(~inference.reachable))

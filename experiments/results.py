@@ -30,6 +30,7 @@ from experiments.lookback.views import (
     study_status,
     summary_list,
 )
+from experiments.terminal import counted
 from experiments.tracking.files import replace_file
 from experiments.tracking.points import State
 from experiments.tracking.study import Study
@@ -201,7 +202,7 @@ def _export(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
         yield data.decode().rstrip("\n")
     else:
         replace_file(options.out.resolve(), data)
-        yield f"written: {options.out} ({len(table)} rows, {table.shape[1]} columns)"
+        yield f"written: {options.out} ({counted(len(table), 'row')}, {table.shape[1]} columns)"
 
 
 def _demonstrations(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
@@ -209,7 +210,7 @@ def _demonstrations(archive: Archive, options: argparse.Namespace) -> Iterator[s
     from experiments.lookback.recordings import write_recordings  # mlci
 
     files = write_recordings(_point(archive, options.point), options.out)
-    yield f"written: {len(files)} demonstrations into {options.out}"
+    yield f"written: {counted(len(files), 'demonstration')} into {options.out}"
     yield f"rank by them: python experiments/infer.py demonstrations={options.out}"
 
 

@@ -8,6 +8,11 @@ from collections.abc import Iterator, Sequence
 WIDTH = 80  # columns of a terminal
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things: 1 point, 2 points."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
 def words(name: str) -> str:
     """A column's or dimension's name as a reader would write it."""
     return name.replace("_", " ")

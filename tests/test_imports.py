@@ -77,7 +77,7 @@ ROOMS = {
     "experiments.terminal": "",
     "experiments.console": "mlci experiments.terminal",
     "experiments.point": f"{POINT} experiments.console experiments.terminal",
-    "experiments.collate": TRACKING,
+    "experiments.collate": f"{TRACKING} experiments.terminal",
     "experiments.sweep": f"{POINT} experiments.terminal experiments.point experiments.collate",
     "experiments.lookback": f"mlci {TRACKING} experiments.collate experiments.config.paths "
     "experiments.config.suggestions experiments.terminal",

@@ -21,6 +21,7 @@ from experiments.collate.examples import example_tables
 from experiments.collate.finished import CollateError, FinishedPoint
 from experiments.collate.intervals import study_tables
 from experiments.collate.reliability import reliability
+from experiments.terminal import counted
 from experiments.tracking.files import csv_bytes, digest, exchange_folders, part_of, replacing
 from experiments.tracking.names import inner_path
 from experiments.tracking.points import Point
@@ -165,7 +166,7 @@ def _refuse_mixture(points: Sequence[FinishedPoint]) -> None:
     if len(by_source) == 1:
         return
     lines = [
-        f"  {source[:12]}: {len(identities)} points, such as {identities[0]}"
+        f"  {source[:12]}: {counted(len(identities), 'point')}, such as {identities[0]}"
         for source, identities in sorted(by_source.items(), key=lambda item: -len(item[1]))
     ]
     raise CollateError(

@@ -10,7 +10,7 @@ from typing import Any
 from experiments.lookback.archive import Archive, Facts, count_states
 from experiments.lookback.freshness import figure_concerns, is_shipped, table_concerns
 from experiments.lookback.query import varying
-from experiments.terminal import job_names, table_lines
+from experiments.terminal import counted, job_names, table_lines
 from experiments.tracking import report_note
 from experiments.tracking.figure_notes import note_damage
 from experiments.tracking.files import read_file
@@ -96,7 +96,7 @@ def study_status(archive: Archive, study: Study) -> Iterator[str]:
     points = archive.points_of(study)
     counts = count_states(points)
     states = ", ".join(f"{counts[state]} {state}" for state in State if counts[state])
-    yield f"{study.name}: {len(points)} points: {states or 'none'}"
+    yield f"{study.name}: {counted(len(points), 'point')}: {states or 'none'}"
     for point in points:
         if point.damage:
             yield f"  point   {_short(point)} does not count: {point.damage}"

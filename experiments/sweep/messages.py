@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from experiments.sweep.plan import PlannedPoint
 from experiments.sweep.runner import Outcome
+from experiments.terminal import counted
 
 
 def describe_problems(problems: Mapping[str, Sequence[str]], total: int) -> str:
@@ -38,12 +39,12 @@ def describe_failures(outcome: Outcome, total: int) -> str:
     return "\n".join(
         [
             *texts,
-            f"{count} of {total} points failed, and no table is written; the others are kept, and "
-            "the same command runs what is missing:",
+            f"{count} of {counted(total, 'point')} failed, and no table is written; the others are "
+            "kept, and the same command runs what is missing:",
             *(
                 f"  {failure['reason']:8}{planned.name:{width}}  {failure['error']}"
                 for planned, failure in outcome.failures
             ),
-            *([f"{not_started} points were not started"] if not_started else []),
+            *([f"not started: {counted(not_started, 'point')}"] if not_started else []),
         ]
     )

@@ -26,7 +26,7 @@ from experiments.sweep.plan import Job, PlannedPoint, count_states, read_point, 
 from experiments.sweep.pool import PoolLauncher
 from experiments.sweep.runner import run_points
 from experiments.sweep.worker import run_task
-from experiments.terminal import job_names
+from experiments.terminal import counted, job_names
 from experiments.tracking.files import digest
 from experiments.tracking.locks import StudyInUse, plan_lock, publication_lock, sweep_lock
 from experiments.tracking.points import State
@@ -69,7 +69,10 @@ class Planner(Sweeper):
         selection = select_points(plan, options)
         if not options.dry_run:
             writable_results(study)
-        print(f"{len(plan)} points: {count_states(plan)}; {len(selection)} to run", flush=True)
+        print(
+            f"{counted(len(plan), 'point')}: {count_states(plan)}; {len(selection)} to run",
+            flush=True,
+        )
         if len(plan) < len(jobs):
             print(f"{len(jobs) - len(plan)} of {len(jobs)} combinations repeat others")
         for note in self._combinations.notes:
@@ -99,7 +102,7 @@ class Planner(Sweeper):
         finished = {*selection, *(p for p in plan if p.state in (State.DONE, State.STALE))}
         if len(finished) < len(plan):
             left = len(plan) - len(finished)
-            print(f"{left} of {len(plan)} points are left, and no table is written")
+            print(f"{left} of {counted(len(plan), 'point')} left, and no table is written")
             return
         points = [planned.point for planned in plan]
         with publication_lock(folder):

@@ -16,6 +16,7 @@ from hydra.core.utils import JobReturn, JobStatus
 from experiments.config.settings import SweepSettings
 from experiments.sweep.attempt import record_death
 from experiments.sweep.plan import PlannedPoint
+from experiments.terminal import counted
 from experiments.tracking.points import State
 
 Launch = Callable[[Sequence[Sequence[str]]], Sequence[JobReturn]]
@@ -90,7 +91,7 @@ def _wait_for_any(points: Sequence[PlannedPoint]) -> list[PlannedPoint]:
     """Those points that no process runs any more, as soon as there are some."""
     names = ", ".join(planned.name or planned.point.identity for planned in points[:5])
     more = ", ..." if len(points) > 5 else ""
-    print(f"waiting for {len(points)} points that another process runs: {names}{more}")
+    print(f"waiting for {counted(len(points), 'point')} that another process runs: {names}{more}")
     while True:
         ended = [planned for planned in points if not planned.point.is_running()]
         if ended:

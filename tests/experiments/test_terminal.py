@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.terminal import WIDTH, entry, job_names, table_lines
+from experiments.terminal import WIDTH, counted, entry, job_names, table_lines
 
 
 def test_an_entry_breaks_between_words_alone() -> None:
     word = "very-long/" * 9
     lines = entry("written", f"a {word} b-c", hang=2)
     assert lines == ["written         a", f"{'':18}{word}", f"{'':18}b-c"]
+
+
+def test_one_is_no_plural() -> None:
+    assert [counted(count, "point") for count in range(3)] == ["0 points", "1 point", "2 points"]
 
 
 def test_a_table_leaves_out_columns_that_do_not_fit_and_says_so() -> None:

@@ -15,11 +15,17 @@ cp -r mlci experiments paper_figures conf pyproject.toml README.md LICENSE "$wor
 "$python" -m venv "$work/venv"
 sed -nE 's/^([a-zA-Z0-9_.-]+==[^\\]*).*/\1/p' requirements.lock > "$work/constraints.txt"
 "$work/venv/bin/pip" install --quiet --constraint "$work/constraints.txt" "$work"/mlci-*.whl
+for extra in excel parquet; do # as README.md says, from a folder with the source
+    (cd "$work/source" && "$work/venv/bin/pip" install --quiet --constraint "$work/constraints.txt" ".[$extra]")
+done
 
 cd "$work/empty"
 export PATH="$work/venv/bin:$PATH"
 unset PYTHONPATH
 git init --quiet . # its commits are not those of the code
+mlci-run --help > "$work/help"
+grep -q mlci-run "$work/help"
+[[ $(mlci-infer --version) == "mlci "* ]]
 mlci-run -m experiment=paper scale=smoke
 mlci-figures smoke
 mlci-report

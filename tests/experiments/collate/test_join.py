@@ -161,7 +161,7 @@ def test_a_mixture_of_sources_is_refused_unless_it_is_allowed(tmp_path: Path) ->
         collate(points, tmp_path / "study")
     _, most, least = str(error.value).splitlines()
     assert most.endswith(f": 2 points, such as {points[0].identity}")
-    assert least == f"  edited: 1 points, such as {points[2].identity}"
+    assert least == f"  edited: 1 point, such as {points[2].identity}"
     assert not (tmp_path / "study").exists()
     collate(points, tmp_path / "study", mixed=True)
     collated = study_of(tmp_path / "study").collated

@@ -39,6 +39,6 @@ def test_failures_share_equal_tracebacks_and_have_a_line_each() -> None:
         "  raised  a          E: x",
         "  died    long name  killed",
         "  raised  c          E: y",
-        "1 points were not started",
+        "not started: 1 point",
     ]
     assert describe_failures(Outcome(failures, []), 9).splitlines() == lines[:-1]

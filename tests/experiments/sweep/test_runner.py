@@ -169,4 +169,4 @@ def test_point_that_another_sweep_runs_is_waited_for(
     meanwhile(finish)
     ends = {"a": "" if end else "done", "b": "done"}
     assert run(points, **ends) == (launched, failures, [])
-    assert capsys.readouterr().out == "waiting for 1 points that another process runs: a\n"
+    assert capsys.readouterr().out == "waiting for 1 point that another process runs: a\n"

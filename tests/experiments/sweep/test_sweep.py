@@ -54,7 +54,7 @@ def test_single_run_shows_its_log_again_when_it_was_finished(tmp_path: Path) -> 
 
 def failure_table(err: str) -> list[list[str]]:
     """Reason, point and message of each row at the end."""
-    rows = err[err.index("points failed, and no table is written") :].splitlines()[1:]
+    rows = err[err.index("failed, and no table is written") :].splitlines()[1:]
     return [row.split(maxsplit=2) for row in rows]
 
 
@@ -95,7 +95,7 @@ def test_failed_points_fail_alone_and_are_run_again_when_asked(
     status, out, err = run_here(tmp_path, *sweep, "sweep.only=[missing,stale]")
     assert status == 0
     assert "5 points: 2 done, 3 failed; 0 to run" in out
-    assert "3 of 5 points are left, and no table is written" in out
+    assert "3 of 5 points left, and no table is written" in out
     (tmp_path / "healed").touch()
     status, out, err = run_here(tmp_path, *sweep)
     assert status == 0, err
@@ -121,7 +121,7 @@ def test_first_failure_stops_a_sweep_that_fails_fast(tmp_path: Path) -> None:
     status, out, err = run_here(tmp_path, *sweep, "sweep.fail_fast=true")
     assert status == 1
     assert "1 of 6 points failed" in err
-    assert err.splitlines()[-1] == "5 points were not started"
+    assert err.splitlines()[-1] == "not started: 5 points"
     status, out, err = run_here(tmp_path, *sweep, "sweep.limit=1")
     assert status == 1
     assert "6 points: 1 failed, 5 missing; 1 to run" in out
@@ -196,7 +196,7 @@ def test_forced_point_runs_again(tmp_path: Path) -> None:
     before = tables(tmp_path, "points")
     status, out, _ = run_here(tmp_path, "-m", "study=s", "sweep.force=true")
     assert status == 0
-    assert "1 points: 1 done; 1 to run" in out
+    assert "1 point: 1 done; 1 to run" in out
     assert [record["attempt"] for record in records(tmp_path)] == [2]
     assert tables(tmp_path, "points") == before
 
@@ -217,4 +217,4 @@ def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(tmp_path: Path)
     assert gone(process.pid)
     status, out, _ = run_here(tmp_path, "-m", *wrong, "+system.fault=none")
     assert status == 0
-    assert "1 points: 1 done; 0 to run" in out
+    assert "1 point: 1 done; 0 to run" in out
