@@ -19,7 +19,7 @@ from typing import Any
 from experiments.config.paths import CHECKOUT, default_results
 from experiments.lookback.archive import Archive, ArchiveError, Facts
 from experiments.lookback.cleaning import clean, empty_trash
-from experiments.lookback.freshness import point_concerns
+from experiments.lookback.freshness import is_shipped, point_concerns
 from experiments.lookback.query import select
 from experiments.lookback.views import (
     differences,
@@ -196,7 +196,10 @@ def _export(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
         raise ArchiveError(f"{options.study}: no point is finished; run the sweep first")
     table = tidy_table(finished, options.table)
     data = file_bytes(table, options.format)
-    if concerns := point_concerns(points):
+    concerns = point_concerns(points)
+    if is_shipped(points):
+        concerns.append("some points are not stored here, and their rows are left out")
+    if concerns:
         print(f"{options.study}: {', '.join(concerns)}", file=sys.stderr)
     if options.out is None:
         yield data.decode().rstrip("\n")

@@ -39,8 +39,17 @@ def main() -> int:
     studies = options.study or sorted(path.parent.name for path in results.glob("*/tables"))
     if not studies:
         raise SystemExit(f"no study in {results}: run one first, python experiments/run.py -m ...")
+    try:
+        return _draw([results / study for study in studies], options)
+    except OSError as error:
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
+        return 1
+
+
+def _draw(studies: list[Path], options: argparse.Namespace) -> int:
+    """Draw the figures of studies; returns the status of the command."""
     is_complete = True
-    for drawing in draw_studies([results / study for study in studies], options.jobs):
+    for drawing in draw_studies(studies, options.jobs):
         for path in drawing.images:
             print(f"drawn: {path}", flush=True)
         if not drawing.images:

@@ -16,7 +16,7 @@ from joblib import Parallel, delayed
 
 from experiments.tracking.figure_notes import figure_note, read_note, sentence, write_note
 from experiments.tracking.files import replace_file
-from experiments.tracking.names import is_name
+from experiments.tracking.names import inner_path, is_name
 from experiments.tracking.study_tables import TableError, read_tables
 from paper_figures import (
     calibration_diagram,
@@ -120,9 +120,10 @@ def _draw(study: Path, name: str) -> Drawing:
     """Draw the figures of one module."""
     module, drawing, source = FIGURES[name], Drawing(study), sentence(study)
     try:
+        folder = inner_path(study.parent, study.name, "figures")
         contents = _contents(study, module)
         for suffix, tables in _versions(module, contents):
-            path = study / "figures" / f"{name}{suffix}"
+            path = folder / f"{name}{suffix}"
             drawing.images.append(save(module.draw(**tables), path, source))
             text = f"{module.facts(**tables)}\n\nSource: {source}.\n"
             replace_file(path.with_name(path.name + ".txt"), text.encode())

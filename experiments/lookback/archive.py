@@ -139,6 +139,8 @@ class Archive:
             return [], []
         folders, problems = _inner_folders(self.results / "points")
         strange = [f"{it}: is no point" for it in folders if not is_identity(it.name)]
+        files = [it for it in (self.results / "points").glob("[!.]*") if it.is_file()]
+        strange += [f"{it}: is a file, and no point" for it in files]
         return [it for it in folders if is_identity(it.name)], problems + strange
 
     @cached_property

@@ -44,6 +44,7 @@ def point_list(
     archive: Archive, study: Study | None, states: Sequence[State], width: int | None
 ) -> Iterator[str]:
     """A line for each point of a study, or of all; `states` keeps some of them."""
+    yield from archive.unreadable
     if study is None:
         members: dict[str, list[str]] = {name: [] for name in archive.points}
         for listed in archive.studies.values():

@@ -37,8 +37,12 @@ def main() -> int:
         raise SystemExit(
             f"no study in {results.folder}: run one first, python experiments/run.py -m ..."
         )
-    for path in write(results):
-        print(f"written: {path}")
+    try:
+        for path in write(results):
+            print(f"written: {path}")
+    except OSError as error:
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
+        return 1
     for damage in dict.fromkeys(results.damage):
         print(damage, file=sys.stderr)
     return 1 if results.damage else 0

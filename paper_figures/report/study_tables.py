@@ -99,8 +99,9 @@ class Results:
         return {key: content[key] for key in _LISTING}
 
     def studies(self) -> list[str]:
-        """The studies that have tables."""
-        return sorted(path.parent.name for path in self.folder.glob("*/tables"))
+        """The studies that have tables, or list some."""
+        paths = [*self.folder.glob("*/tables"), *self.folder.glob("*/study.json")]
+        return sorted({path.parent.name for path in paths})
 
 
 def command(study: str) -> str:

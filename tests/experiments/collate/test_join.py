@@ -246,3 +246,26 @@ def test_examples_and_cases_of_the_plan_become_tables(tmp_path: Path) -> None:
         "wall,12,3,0.5,1,a: b,a,b",
     ]
     assert messages == ["examples.ranking: no point of truth wall is as named, so it shows none"]
+
+
+def test_tables_stay_as_they_were_if_collating_fails(tmp_path: Path) -> None:
+    point, folder = point_with(tmp_path), tmp_path / "study"
+    collate([point], folder)
+    before = {path.name: path.read_bytes() for path in (folder / "tables").iterdir()}
+    (point.folder / "trials.csv").write_text("cut")
+    with pytest.raises(CollateError, match="not as its point wrote it"):
+        collate([point], folder)
+    assert {path.name: path.read_bytes() for path in (folder / "tables").iterdir()} == before
+    assert sorted(path.name for path in folder.iterdir()) == ["study.json", "tables"]
+
+
+def test_a_path_in_a_listing_is_never_followed(tmp_path: Path) -> None:
+    point, folder = point_with(tmp_path), tmp_path / "study"
+    collate([point], folder)
+    victim = tmp_path / "victim.txt"
+    victim.write_text("of somebody else")
+    listed = read_sealed(folder / "study.json")["collated"]
+    for name in ("../../victim.txt", str(victim)):
+        alter(folder / "study.json", collated={**listed, "tables": {name: "0" * 64}})
+        collate([point], folder)
+        assert victim.read_text() == "of somebody else"

@@ -1,12 +1,22 @@
 """Files that are the old one or the new one, whatever happens."""
 
 import os
+import re
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from experiments.tracking.files import PART, csv_bytes, replace_file, replacing
+from experiments.tracking import files
+from experiments.tracking.files import (
+    PART,
+    csv_bytes,
+    exchange_folders,
+    growing,
+    read_file,
+    replace_file,
+    replacing,
+)
 
 
 def test_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -62,3 +72,73 @@ def test_error_in_the_block_leaves_the_old_file(tmp_path: Path) -> None:
 def test_csv_has_exact_floats() -> None:
     data = csv_bytes(pd.DataFrame({"a": [1 / 3, 5e-324], "b": ["x,y", None]}))
     assert data == b'a,b\n0.3333333333333333,"x,y"\n5e-324,\n'
+
+
+def test_only_regular_files_are_read(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"content")
+    assert read_file(tmp_path / "file") == b"content"
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    os.mkfifo(tmp_path / "pipe")
+    for name, reason in (("link", "is a link"), ("pipe", "no regular file"), (".", "regular")):
+        with pytest.raises(OSError, match=reason):
+            read_file(tmp_path / name)
+
+
+@pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])
+def test_the_umask_says_who_may_read(mask: int, tmp_path: Path) -> None:
+    before = os.umask(mask)
+    try:
+        replace_file(tmp_path / "file", b"")
+        with growing(tmp_path / "log"):
+            pass
+    finally:
+        os.umask(before)
+    for name in ("file", "log"):
+        assert (tmp_path / name).stat().st_mode & 0o777 == 0o666 & ~mask
+
+
+def test_a_log_takes_the_place_of_a_link_and_leaves_its_target(tmp_path: Path) -> None:
+    (tmp_path / "target").write_text("of somebody else")
+    (tmp_path / "log.txt").symlink_to(tmp_path / "target")
+    with growing(tmp_path / "log.txt") as file:
+        file.write("größe\n")
+        assert (tmp_path / "log.txt").read_text(encoding="utf-8") == "größe\n"
+    assert (tmp_path / "target").read_text() == "of somebody else"
+
+
+@pytest.mark.parametrize("can_exchange", [True, False])
+def test_folders_change_names(
+    can_exchange: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not can_exchange:
+        monkeypatch.setattr(files, "_exchanged", lambda *_: False)
+    new, old = tmp_path / "new", tmp_path / "old"
+    replace_file(new / "a", b"1")
+    exchange_folders(new, old)
+    assert not new.exists()
+    replace_file(new / "a", b"2")
+    exchange_folders(new, old)
+    assert ((old / "a").read_bytes(), (new / "a").read_bytes()) == (b"2", b"1")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["new", "old"]
+
+
+# What else writes: into a file of the kernel. The library writes where its caller says.
+_OTHERS = {"experiments/tracking/environment.py"}
+_WRITES = re.compile(
+    r"""\.write_(text|bytes)\(|open\([^)]*["'][wxa]b?\+?["']|savefig\((?!content)|\.to_csv\([^i)]"""
+    r"""|\.to_(csv|parquet|json)\((path|folder)|np\.savez?\((?!buffer)|\.touch\(|mkstemp|shutil\.copy"""
+)
+
+
+def test_there_is_one_way_to_write_a_file() -> None:
+    root = Path(files.__file__).parents[2]
+    packages = [root / name for name in ("experiments", "paper_figures")]
+    paths = [path for package in packages for path in package.rglob("*.py")]
+    found = {
+        path.relative_to(root).as_posix(): line.strip()
+        for path in paths
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if _WRITES.search(line)
+    }
+    assert found.pop("experiments/tracking/files.py", None)
+    assert set(found) <= _OTHERS, found

@@ -144,3 +144,32 @@ def test_point_runs_as_long_as_its_holder_lives(point: Point) -> None:
     while point.is_running() and time.monotonic() < deadline:
         time.sleep(0.01)
     assert point.state() is State.MISSING
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"files": {"../trials.csv": "0" * 64}},
+        {"files": {"/etc/hostname": "0" * 64}},
+        {"files": {"trials.csv": "0"}},
+        {"stages": {"..": "0" * 32}},
+        {"stages": {"tasks": "../../x"}},
+        {"git": {"diff": "../x"}},
+        {"git": None},
+        {"config": {**CONFIG, "dt": 0.25}},
+    ],
+)
+def test_record_with_strange_names_or_another_config_does_not_count(
+    changes: dict[str, Any], point: Point
+) -> None:
+    finish(point, **changes)
+    assert point.record() is None
+    assert "is no record of this point" in str(point.damage())
+
+
+def test_point_whose_folder_is_a_link_is_nobodys(point: Point, tmp_path: Path) -> None:
+    finish(point)
+    point.folder.rename(tmp_path / "elsewhere")
+    (tmp_path / "points" / point.identity).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(OSError, match="is a link"):
+        point.state()
