@@ -156,7 +156,10 @@ def _values(field: dict[str, Any], tree: dict[str, Any]) -> str:
     if node["type"] == "array":
         return f"list of ({_values(node['items'], tree)})"
     if node["type"] == "object":
-        keys = [*node.get("properties", {}), *["..."] * (node["additionalProperties"] is True)]
+        others = node["additionalProperties"]
+        if isinstance(others, dict):
+            return f"{{name: {_values(others, tree)}, ...}}"
+        keys = [*node.get("properties", {}), *["..."] * (others is True)]
         return f"{{{', '.join(keys)}}}"
     bounds = [f"{sign} {node[bound]:.16g}" for bound, sign in _BOUNDS.items() if bound in node]
     return " ".join([_TYPES[node["type"]], ", ".join(bounds)]).strip()

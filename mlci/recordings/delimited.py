@@ -20,6 +20,8 @@ from mlci.recordings.table import Table, Unusable, Wants
 
 _DELIMITERS = ("\t", ";", "|", ",")
 SPACES = r"\s+"
+_LONG_LINE, _LONG_ENTRY = 10_000, 1000  # characters; numbers that are longer take very long
+_MOST_COLUMNS, _WIDE = 100_000, 1000  # a wide table is slow to read by column
 _SEEN = 50  # lines by which delimiter and decimal sign are known
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -47,6 +49,9 @@ def read(file: Path, _wants: Wants, _limit: int) -> Table:
     if not full:
         raise Unusable("is empty")
     delimiter = sign[1] if sign else _delimiter([lines[i] for i in full[:_SEEN]])
+    width = _count(lines[full[0]], delimiter)
+    if width > _MOST_COLUMNS:
+        raise Unusable(f"line {full[0] + 1} has {width} values: {_MOST_COLUMNS} are the most")
     first, header = split(lines[full[0]], delimiter), None
     if not _is_number(first[0]):
         header, full = first, full[1:]
@@ -98,25 +103,45 @@ def table_of_lines(
     """
     names = [f"column {i + 1}" for i in range(header)] if isinstance(header, int) else list(header)
     texts = [_of_width(lines[i], delimiter, len(names), i, rows, named) for i in rows]
-    seen = [entry for text in texts[:_SEEN] for entry in split(text, delimiter)]
+    seen = [entry for text in texts[:_SEEN] for entry in split(text, delimiter)[:_WIDE]]
     comma = delimiter != "," and any(map(_DECIMAL_COMMA.fullmatch, seen))
+    if len(names) > _WIDE:
+        frame = _by_row(texts, delimiter, comma)
+    else:
+        frame = _by_column(texts, delimiter, comma, len(names))
+    if len(frame) != len(rows):
+        raise Unusable(f"has {len(rows)} lines of samples, but {len(frame)} rows: quotes?")
+    frame.columns = pd.Index([name.strip() for name in names])
+    return Table(file, frame, lines=np.array(rows, dtype=np.int64) + 1, header=named)
+
+
+def _by_row(texts: Sequence[str], delimiter: str, comma: bool) -> pd.DataFrame:
+    """A table of many columns."""
+    rows = []
+    for text in texts:
+        row = pd.Series(split(text.replace(",", ".") if comma else text, delimiter), dtype=object)
+        try:
+            rows.append(pd.to_numeric(row).to_numpy())
+        except ValueError:
+            rows.append(row.to_numpy())
+    return pd.DataFrame(np.vstack(rows)) if rows else pd.DataFrame()
+
+
+def _by_column(texts: Sequence[str], delimiter: str, comma: bool, width: int) -> pd.DataFrame:
+    """A table of few columns."""
     try:
-        frame = pd.read_csv(
+        return pd.read_csv(
             io.StringIO("\n".join(texts)),
             sep=delimiter,
             header=None,
-            names=range(len(names)),
+            names=range(width),
             index_col=False,
             decimal="," if comma else ".",
             skipinitialspace=True,
             low_memory=False,
         )
     except pd.errors.EmptyDataError:
-        frame = pd.DataFrame({i: np.empty(0) for i in range(len(names))})
-    if len(frame) != len(rows):
-        raise Unusable(f"has {len(rows)} lines of samples, but {len(frame)} rows: quotes?")
-    frame.columns = pd.Index([name.strip() for name in names])
-    return Table(file, frame, lines=np.array(rows, dtype=np.int64) + 1, header=named)
+        return pd.DataFrame({i: np.empty(0) for i in range(width)})
 
 
 def split(line: str, delimiter: str) -> list[str]:
@@ -128,17 +153,24 @@ def split(line: str, delimiter: str) -> list[str]:
     return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [""])
 
 
+def _count(line: str, delimiter: str) -> int:
+    """How many entries a line has."""
+    if delimiter != SPACES and '"' not in line:
+        return line.count(delimiter) + 1
+    return len(split(line, delimiter))
+
+
 def _of_width(
     line: str, delimiter: str, width: int, number: int, rows: Sequence[int], named: bool
 ) -> str:
     """A line that must have so many entries; one delimiter may follow the last."""
+    count = _count(line, delimiter)
     if delimiter == SPACES:
-        count = len(line.split())
         line = line.strip()
-    else:
-        count = len(split(line, delimiter)) if '"' in line else line.count(delimiter) + 1
-        if count == width + 1 and line.rstrip(" ").endswith(delimiter):
-            line, count = line.rstrip(" ")[:-1], width
+    elif count == width + 1 and line.rstrip(" ").endswith(delimiter):
+        line, count = line.rstrip(" ")[:-1], width
+    if len(line) > _LONG_LINE and max(map(len, split(line, delimiter))) > _LONG_ENTRY:
+        raise Unusable(f"line {number + 1} has an entry of more than {_LONG_ENTRY} characters")
     if count != width:
         before = "the header" if named else f"line {rows[0] + 1}"
         raise Unusable(f"line {number + 1} has {count} values where {before} has {width}")
@@ -149,7 +181,7 @@ def _delimiter(lines: Sequence[str]) -> str:
     """What cuts most of these lines into the same number of entries, at least two."""
     best, score = ",", 0.0
     for delimiter in (*_DELIMITERS, SPACES):
-        counts = [len(split(line, delimiter)) for line in lines]
+        counts = [_count(line, delimiter) for line in lines]
         usual = max(set(counts), key=counts.count)
         share = counts.count(usual) / len(lines)
         if usual > 1 and share > score:
