@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -25,6 +26,7 @@ from mlci.recordings.units import converted, in_degrees
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import System
 
+_ALIKE = 0.4  # share of letters in common, from which a name is offered
 SAMPLES = "samples"  # as a unit of time: the number of a sample
 
 
@@ -144,7 +146,9 @@ def _refuse_missing(
     if not missing:
         return
     names = [*map(str, table.columns.columns), *table.others]
-    example = f"columns={{{missing[-1]}: {others[0] if others else 'its name there'}}}"
+    alike = difflib.get_close_matches(missing[-1], others, 1, _ALIKE)
+    offered = alike if len(others) > 1 else others
+    example = f"columns={{{missing[-1]}: {offered[0] if offered else 'NAME'}}}"
     array = f" (or columns={{{STATES}: NAME}} for an array of all)" if len(missing) > 1 else ""
     without = f"; without time, time_unit={SAMPLES}" if missing == ["time"] else ""
     raise ValueError(

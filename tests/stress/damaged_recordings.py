@@ -197,7 +197,7 @@ def main() -> None:
         folder.mkdir()
         files = write_damaged(folder)
         for number in range(GOOD):
-            swing(0.4 * number).to_csv(folder / f"good_{number}.csv", index=False)
+            swing(0.1 + 0.4 * number).to_csv(folder / f"good_{number}.csv", index=False)
         infer = str(TESTS.parent / "experiments" / "infer.py")
         words = ["grid=100", "dt=0.5", "inference.calibrate=false", f"results={base}/results"]
         command = [sys.executable, infer, f"demonstrations={folder}", *words]
