@@ -92,4 +92,4 @@ __all__ = [
     "write_demonstration",
 ]
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
