@@ -220,10 +220,15 @@ def _try(
     before = time.process_time()
     model = discretize(settings.model, grid, _actions(settings), dt, settings.candidates, samples)
     formed = time.process_time() - before
-    distributions = [TrajectoryDistribution.of_task(model, task) for task in tasks]
+    merged, distributions = (
+        model.merged,
+        [TrajectoryDistribution.of_task(model, task) for task in tasks],
+    )
     reached = np.array(
         [
-            np.isin(each.goal, reachable_cells(model, np.array([each.start]), each.steps)[-1]).any()
+            np.isin(
+                each.goal, reachable_cells(merged, np.array([each.start]), each.steps)[-1]
+            ).any()
             for each in distributions
         ]
     )

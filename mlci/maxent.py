@@ -10,26 +10,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
 from mlci.demonstrations import Task
 from mlci.end_moves import EndMoves, first_moves, last_moves, only_moves
-from mlci.recursions import (
-    add_moves,
-    avoidance_backwards,
-    avoidance_of_moves,
-    move_probabilities,
-    reachable_cells,
-    soft_bellman_backup,
-)
+from mlci.recursions import move_probabilities, reachable_cells
 from mlci.simulate import step_count
 from mlci.spaces import Box, Floats, Ints
 from mlci.tabular import TabularModel
+from mlci.task_batches import avoidance_of_tasks, log_z_of_tasks
 
 ROUNDED_TIMES = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
-ALPHA_BYTES = 1 << 29  # of probabilities held at once, else regions go block by block
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,27 +108,14 @@ class TrajectoryDistribution:
             scale = self.model.temperature / model.temperature
             vars(other)["start_moves"] = self.start_moves.scaled(scale)
             if self.steps > 1:
-                vars(other)["_cells_between"] = self._cells_between
+                vars(other)["cells_between"] = self.cells_between
                 vars(other)["goal_moves"] = self.goal_moves.scaled(scale)
         return other
 
     @cached_property
     def log_z(self) -> Floats:
         """(T+1, S) log Z to go [nat], by the soft Bellman backup; log_z[0, start] is log Z."""
-        log_z = np.full((self.steps + 1, self.model.states), -np.inf)
-        if self.ends is None:
-            cells = reachable_cells(self.model, np.array([self.start]), self.steps)
-            log_z[self.steps, np.intersect1d(cells[-1], self.goal)] = 0.0
-            soft_bellman_backup(self.model, log_z, dict(enumerate(cells[:-1])))
-            return log_z
-        log_z[self.steps, self.goal] = 0.0
-        if self.steps > 1:
-            add_moves(log_z, self.steps - 1, self.goal_moves)
-            soft_bellman_backup(
-                self.model, log_z, dict(enumerate(self._cells_between[:-1], start=1))
-            )
-        add_moves(log_z, 0, self.start_moves)
-        return log_z
+        return log_z_of_tasks([self])[:, 0]
 
     @cached_property
     def start_moves(self) -> EndMoves:
@@ -147,15 +126,16 @@ class TrajectoryDistribution:
         return first_moves(self.model, self.ends.start)
 
     @cached_property
-    def _cells_between(self) -> list[Ints]:
+    def cells_between(self) -> list[Ints]:
         """Cells that can be occupied after 1 .. T-1 moves from the exact start."""
-        return reachable_cells(self.model, np.unique(self.start_moves.successor), self.steps - 2)
+        starts = np.unique(self.start_moves.successor)
+        return reachable_cells(self.model.merged, starts, self.steps - 2)
 
     @cached_property
     def goal_moves(self) -> EndMoves:
         """The moves that end at the exact goal."""
         assert self.ends is not None
-        return last_moves(self.model, self._cells_between[-1], self.goal, self.ends.goal)
+        return last_moves(self.model, self.cells_between[-1], self.goal, self.ends.goal)
 
     @property
     def is_possible(self) -> bool:
@@ -184,25 +164,7 @@ class TrajectoryDistribution:
             ValueError: no trajectory reaches a goal.
         """
         self._require_possible("probabilities are not defined")
-        regions = len(self.model.regions)
-        support = int(np.max(np.sum(self.log_z > -np.inf, axis=1)))
-        blocks = min(regions, -(-regions * 2 * 8 * support // ALPHA_BYTES))
-        edges = np.linspace(0, regions, max(1, blocks) + 1).astype(int)
-        alpha = np.concatenate([self._avoidance(*block) for block in pairwise(edges)])
-        return np.minimum(alpha, 1.0)
-
-    def _avoidance(self, first: int, last: int) -> Floats:
-        """alpha of the regions from `first` to before `last`."""
-        ones = np.ones((int(np.sum(self.log_z[self.steps] > -np.inf)), last - first))
-        if self.ends is None:
-            alpha = avoidance_backwards(self.model, self.log_z, ones, self.steps, 0, first)
-        elif self.steps == 1:
-            alpha = avoidance_of_moves(self.log_z, 0, self.start_moves, ones, first)
-        else:
-            alpha = avoidance_of_moves(self.log_z, self.steps - 1, self.goal_moves, ones, first)
-            alpha = avoidance_backwards(self.model, self.log_z, alpha, self.steps - 1, 1, first)
-            alpha = avoidance_of_moves(self.log_z, 0, self.start_moves, alpha, first)
-        return alpha[0]
+        return avoidance_of_tasks([self])[0]
 
     def violation_probabilities(self) -> Floats:
         """Phi_(i,T) = 1 - alpha_i (C,): the probability that a trajectory crosses region i."""

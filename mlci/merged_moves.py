@@ -44,6 +44,35 @@ class MergedMoves:
     certain_begins: Ints
     certain_region: Ints
 
+    @property
+    def states(self) -> int:
+        """S, the number of cells."""
+        return len(self.begins) - 1
+
+    def copies(self, count: int) -> MergedMoves:
+        """Those of as many copies of the model side by side: cell s of copy j is cell j S + s."""
+        if count == 1:
+            return self
+        moves = len(self.successor)
+
+        def begins(one: Ints) -> Ints:
+            return np.append(0, np.add.outer(np.arange(count) * one[-1], one[1:]).ravel())
+
+        def shifted(numbers: Ints, size: int) -> Ints:
+            return np.add.outer(np.arange(count) * size, numbers).ravel()
+
+        return MergedMoves(
+            begins=begins(self.begins),
+            successor=shifted(self.successor, self.states),
+            move=np.tile(self.move, count),
+            log_weight=np.tile(self.log_weight, count),
+            crossing_begins=begins(self.crossing_begins),
+            crossing_move=shifted(self.crossing_move, moves),
+            crossing_region=np.tile(self.crossing_region, count),
+            certain_begins=begins(self.certain_begins),
+            certain_region=np.tile(self.certain_region, count),
+        )
+
     def without(self, crossed: Bools) -> MergedMoves:
         """The same with those forbidden whose moves are `crossed` (S, M)."""
         cell = np.repeat(np.arange(len(crossed)), np.diff(self.begins))

@@ -23,6 +23,7 @@ from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions, as_mask
 from mlci.spaces import Bools, Floats
 from mlci.tabular import Progress, TabularModel
+from mlci.task_batches import are_possible, avoidance_of_tasks, batches
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,9 +236,10 @@ def prepare(
     if tasks:
         _ = model.merged  # once for all tasks and processes
     work = Parallel(n_jobs=n_jobs, return_as="generator")(
-        delayed(_avoidance_probabilities)(distribution) for distribution in distributions
+        delayed(_avoidance_probabilities)(batch) for batch in batches(distributions)
     )
-    for j, of_task in enumerate(work):
+    of_tasks = (of_task for of_batch in work for of_task in zip(*of_batch, strict=True))
+    for j, of_task in enumerate(of_tasks):
         reachable[j], avoidance[j], decided[j] = of_task
         if progress is not None:
             progress(j + 1, len(tasks))
@@ -246,15 +248,24 @@ def prepare(
     )
 
 
-def _avoidance_probabilities(distribution: TrajectoryDistribution) -> tuple[bool, Floats, Bools]:
-    """Whether a task can be done, its alpha (C,), 1 if it cannot, and what a cell decides (C,)."""
-    nothing = np.zeros(len(distribution.model.regions), dtype=bool)
-    if not distribution.is_possible:
-        return False, np.ones(len(nothing)), nothing
-    alpha, between_cells = distribution.avoidance_probabilities(), replace(distribution, ends=None)
-    if distribution.ends is None or not between_cells.is_possible:
-        return True, alpha, nothing
-    return True, alpha, decided_by_cell(between_cells.avoidance_probabilities(), alpha)
+def _avoidance_probabilities(
+    batch: Sequence[TrajectoryDistribution],
+) -> tuple[Bools, Floats, Bools]:
+    """Which tasks can be done (N,), alpha (N, C), 1 if not, and what a cell decides (N, C)."""
+    shape = len(batch), len(batch[0].model.regions)
+    avoidance, decided = np.ones(shape), np.zeros(shape, dtype=bool)
+    reachable = are_possible(batch)
+    if reachable.any():
+        able = [each for each in batch if each.is_possible]
+        avoidance[reachable] = avoidance_of_tasks(able)
+        if batch[0].ends is not None:
+            between_cells = [replace(each, ends=None) for each in able]
+            also = are_possible(between_cells)
+            if also.any():
+                of_cells = avoidance_of_tasks([each for each in between_cells if each.is_possible])
+                rows = np.flatnonzero(reachable)[also]
+                decided[rows] = decided_by_cell(of_cells, avoidance[rows])
+    return reachable, avoidance, decided
 
 
 def _violations(

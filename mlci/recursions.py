@@ -14,28 +14,28 @@ import numpy as np
 from scipy import sparse
 
 from mlci.end_moves import EndMoves
+from mlci.merged_moves import MergedMoves
 from mlci.spaces import Floats, Ints
 from mlci.tabular import TabularModel
 
 _CELLS_AT_ONCE = 1 << 12  # whose moves a step of work holds
 
 
-def reachable_cells(model: TabularModel, starts: Ints, steps: int) -> list[Ints]:
+def reachable_cells(merged: MergedMoves, starts: Ints, steps: int) -> list[Ints]:
     """Cells that can be occupied after t = 0 .. steps allowed moves from some of the starts."""
-    merged, cells = model.merged, [starts]
+    cells = [starts]
     for _ in range(steps):
         move, _ = _ranges(merged.begins, cells[-1])
-        mark = np.zeros(model.states, dtype=bool)
+        mark = np.zeros(merged.states, dtype=bool)
         mark[merged.successor[move[merged.log_weight[move] > -np.inf]]] = True
         cells.append(np.flatnonzero(mark))
     return cells
 
 
-def soft_bellman_backup(model: TabularModel, log_z: Floats, cells: dict[int, Ints]) -> None:
+def soft_bellman_backup(merged: MergedMoves, log_z: Floats, cells: dict[int, Ints]) -> None:
     """Fill in log_z (T+1, S), backwards over the cells that can be occupied at each step."""
-    merged = model.merged
     for t in sorted(cells, reverse=True):
-        for here in _parts(model, cells[t]):
+        for here in _parts(merged, cells[t]):
             move, ends = _ranges(merged.begins, here)
             value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
             best = np.maximum.reduceat(value, ends[:-1])
@@ -69,10 +69,10 @@ def avoidance_of_moves(
 
 
 def avoidance_backwards(
-    model: TabularModel, log_z: Floats, alpha: Floats, late: int, early: int, first: int
+    merged: MergedMoves, log_z: Floats, alpha: Floats, late: int, early: int, first: int
 ) -> Floats:
     """alpha (Q, C') at step `early` of the regions from `first` on, from that at step `late`."""
-    row_of = np.zeros(model.states, dtype=np.int64)
+    row_of = np.zeros(merged.states, dtype=np.int64)
     cells_after = np.flatnonzero(log_z[late] > -np.inf)
     for t in reversed(range(early, late)):
         row_of[:] = -1
@@ -80,16 +80,16 @@ def avoidance_backwards(
         cells = np.flatnonzero(log_z[t] > -np.inf)
         alpha_after, alpha = alpha, np.empty((len(cells), alpha.shape[1]))
         row = 0
-        for here in _parts(model, cells):
+        for here in _parts(merged, cells):
             now = alpha[row : row + len(here)]
-            now[:] = _alpha_one_step_back(model, log_z, t, here, row_of, alpha_after, first)
+            now[:] = _alpha_one_step_back(merged, log_z, t, here, row_of, alpha_after, first)
             row += len(here)
         cells_after = cells
     return alpha
 
 
 def _alpha_one_step_back(
-    model: TabularModel,
+    merged: MergedMoves,
     log_z: Floats,
     t: int,
     cells: Ints,
@@ -103,7 +103,7 @@ def _alpha_one_step_back(
     crosses: less what those moves bring where that is up to a half, which costs no digit; elsewhere
     the sum over the others anew.
     """
-    merged, width = model.merged, alpha_after.shape[1]
+    width = alpha_after.shape[1]
     last = first + width
     move, ends = _ranges(merged.begins, cells)
     value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
@@ -157,9 +157,9 @@ def _of_cells(
     return owner[inside], entry[inside], region[inside]
 
 
-def _parts(model: TabularModel, cells: Ints) -> Iterator[Ints]:
+def _parts(merged: MergedMoves, cells: Ints) -> Iterator[Ints]:
     """Cells that some move leaves, in parts whose moves fit into memory and cache."""
-    begins = model.merged.begins
+    begins = merged.begins
     left = cells[begins[cells + 1] > begins[cells]]
     for first in range(0, len(left), _CELLS_AT_ONCE):
         yield left[first : first + _CELLS_AT_ONCE]

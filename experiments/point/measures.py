@@ -16,6 +16,7 @@ from mlci.metrics import final_state_error, violation_distance
 from mlci.simulate import rollout
 from mlci.spaces import Bools, Floats, Ints
 from mlci.systems import System
+from mlci.task_batches import are_possible, avoidance_of_tasks, batches
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,24 +52,26 @@ def measure_point(settings: Settings, point: PointInference) -> Measures:
     if settings.rollouts == 0:
         nothing = np.full(count, np.nan)
         return Measures(feasible, phi, nothing, nothing, nothing, nothing, {})
-    for j, (number, demonstration) in enumerate(
-        zip(point.numbers.tolist(), point.demonstrations, strict=True)
-    ):
-        distribution = TrajectoryDistribution.of_task(model, demonstration.task)
-        feasible[j] = distribution.is_possible
-        if not feasible[j]:
+    tasks, first = [demonstration.task for demonstration in point.demonstrations], 0
+    for batch in batches(TrajectoryDistribution.of_task(model, task) for task in tasks):
+        members = first + np.flatnonzero(are_possible(batch))
+        first += len(batch)
+        if not len(members):
             continue
-        phi[j] = distribution.violation_probabilities()[point.hypotheses]
-        cells, moves = distribution.sample(
-            settings.rollouts, stream(settings.seed, Purpose.ROLLOUTS, number)
-        )
-        trajectories[number] = cells[0], moves[0]
-        controls.append(model.actions[model.action[moves]])
+        able = [distribution for distribution in batch if distribution.is_possible]
+        feasible[members] = True
+        phi[members] = 1 - avoidance_of_tasks(able)[:, point.hypotheses]
+        for number, distribution in zip(point.numbers[members].tolist(), able, strict=True):
+            cells, moves = distribution.sample(
+                settings.rollouts, stream(settings.seed, Purpose.ROLLOUTS, number)
+            )
+            trajectories[number] = cells[0], moves[0]
+            controls.append(model.actions[model.action[moves]])
     error, distance, floor, share = np.full((4, count), np.nan)
     if feasible.any():
-        able = [point.demonstrations[j] for j in np.flatnonzero(feasible)]
+        done = [point.demonstrations[j] for j in np.flatnonzero(feasible)]
         error[feasible] = rollout_errors(
-            model.system, able, np.stack(controls), model.dt, settings.demonstrations.dt
+            model.system, done, np.stack(controls), model.dt, settings.demonstrations.dt
         )
         violations = violation_distance(phi[feasible], inference.violated[feasible])
         distance[feasible], floor[feasible] = violations.each, violations.floor

@@ -111,7 +111,7 @@ def test_blocks_of_any_size_give_the_same_bits(
     phi = whole.violation_probabilities()
     assert np.sum((phi > 0.01) & (phi < 0.99)) > 10
     monkeypatch.setattr("mlci.recursions._CELLS_AT_ONCE", cells_at_once)
-    monkeypatch.setattr("mlci.maxent.ALPHA_BYTES", phi_bytes)
+    monkeypatch.setattr("mlci.task_batches.ALPHA_BYTES", phi_bytes)
     in_blocks = replace(whole)
     np.testing.assert_array_equal(in_blocks.log_z, whole.log_z)
     np.testing.assert_array_equal(in_blocks.violation_probabilities(), phi)
@@ -187,7 +187,7 @@ def test_only_cells_between_start_and_goal_carry_probability() -> None:
         np.ones((cells, 1), dtype=bool),
         np.zeros((cells, 1), dtype=bool),
     )
-    assert [part.tolist() for part in reachable_cells(corridor, np.array([1]), 3)] == [
+    assert [part.tolist() for part in reachable_cells(corridor.merged, np.array([1]), 3)] == [
         [1],
         [2],
         [3],
