@@ -17,8 +17,9 @@ def command_words(words: Sequence[str]) -> list[str]:
     """A command line for Hydra, that finds the configs in `conf` of the current folder too.
 
     Raises:
-        ConfigError: one of them has the name of ours, which would be taken in its place; or a
-            subject, whose file is composed last, would silently overrule another word.
+        ConfigError: one of them has the name of ours, which would be taken in its place; a
+            subject, whose file is composed last, would silently overrule another word; or another
+            sweeper than ours.
     """
     # Hydra wants -m before, or after, all overrides.
     ordered = [
@@ -28,6 +29,8 @@ def command_words(words: Sequence[str]) -> list[str]:
     own = Path.cwd() / "conf"
     named = any(word.partition("=")[0] in ("--config-dir", "-cd") for word in words)
     given = {word.partition("=")[0]: word for word in words}
+    if (sweeper := given.get("hydra/sweeper", "hydra/sweeper=planner")) != "hydra/sweeper=planner":
+        raise ConfigError(f"{sweeper}: sweeps are planned by mlci's own sweeper; leave this out")
     if "subject" in given:
         for group in given.keys() & {"system", "truth", "grid"}:
             raise ConfigError(

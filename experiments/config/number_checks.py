@@ -14,6 +14,7 @@ from experiments.config.memory import expected_memory, machine_memory
 from experiments.config.settings import AdviceSettings, ModelSettings, Settings, StudySettings
 
 _MOST_STEPS = 100_000
+_LONGEST_NAME = 200  # letters of a study; files of 255 bytes are named after it
 _TAKEN = ("points", "store", "diffs", "inference", "trash")  # among the folders of results
 
 
@@ -24,6 +25,11 @@ def study_problems(study: StudySettings) -> Iterator[str]:
         yield (
             f"study: {name!r} cannot name a folder of results; use letters, digits, - and _ "
             f"({', '.join(_TAKEN)} are taken)"
+        )
+    elif name is not None and len(name) > _LONGEST_NAME:
+        yield (
+            f"study: {name[:20]}... has {len(name)} letters, which a folder's name cannot; use at "
+            f"most {_LONGEST_NAME}"
         )
     sweep = study.sweep
     if sweep.only is not None and sweep.force:

@@ -16,6 +16,7 @@ from mlci.grids import Grid
 from mlci.spaces import Box
 from mlci.system_check import check_affine
 
+_PROBES = 1000  # random states; a truth that holds all of them leaves no room
 _MOST_VALUES = 100_000_000  # of a safe set's grid: about 1 GB for each of its arrays
 
 
@@ -75,6 +76,12 @@ def safe_set_problems(settings: Settings) -> Iterator[str]:
     """A wide border, dynamics without a safe set, and a grid that is too fine or too coarse."""
     safety, space = settings.safety, settings.model.space
     if len(settings.constraint):
+        states = np.random.default_rng(0).uniform(
+            space.bounds.lower, space.bounds.upper, (_PROBES, space.dimension)
+        )
+        if np.all(settings.constraint.signed_distance(states) <= 0):
+            yield f"truth.boxes: {settings.truth.name} forbids every state; make its boxes smaller"
+            return
         try:
             check_affine(settings.real_model)
         except ValueError as error:

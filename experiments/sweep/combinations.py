@@ -20,12 +20,15 @@ Each part may be left out. Where an override has several values, so has its list
 from __future__ import annotations
 
 import itertools
+import math
+import random
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from decimal import Decimal
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override
+from hydra.core.override_parser.types import Override, RangeSweep
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
@@ -139,8 +142,8 @@ class Combinations:
         """What a study gives a key, or the ends of it; notes what the ends stand for."""
         values = _values(override)
         if self.ends and len(values) > 2:
-            every = ", ".join(override.sweep_string_iterator())
-            first, *_, last = override.sweep_string_iterator()
+            every = ", ".join(swept_texts(override))
+            first, *_, last = swept_texts(override)
             key = override.get_key_element()
             self.notes.append(f"{key}: {first} and {last} stand for all of {every}")
             values = [values[0], values[-1]]
@@ -206,7 +209,20 @@ def _values(override: Override) -> list[str]:
         raise ConfigError(f"{override.input_line}: {_NOT_SWEPT[name]}")
     if not override.is_discrete_sweep():
         raise ConfigError(f"{override.input_line}: cannot be swept; list its values")
-    values = [quote_options(f"{key}={value}") for value in override.sweep_string_iterator()]
+    values = [quote_options(f"{key}={value}") for value in swept_texts(override)]
     if not values:
         raise ConfigError(f"{override.input_line}: there is no value to sweep")
     return values
+
+
+def swept_texts(override: Override) -> list[str]:
+    """The values of a discrete sweep, as text; those of a range are the decimals that it counts."""
+    spans = override.value()
+    if not isinstance(spans, RangeSweep) or isinstance(spans.range(), range):
+        return list(override.sweep_string_iterator())
+    start, stop, step = (Decimal(repr(end)) for end in (spans.start, spans.stop, spans.step))
+    count = max(0, math.ceil((stop - start) / step)) if step else 0
+    texts = [repr(float(start + i * step)) for i in range(count)]
+    if spans.shuffle:
+        random.shuffle(texts)
+    return texts

@@ -113,6 +113,7 @@ class Planner(Sweeper):
         """Compose and check every point; of equal ones the first stays."""
         plan: dict[str, PlannedPoint] = {}
         composer, trees = Composer(self._loader, self._base), dict[Job, dict[str, Any]]()
+        studies: list[StudySettings] = []
         problems: dict[str, list[str]] = {}
         bar = tqdm(jobs, desc="checking points", unit="point", leave=False, disable=None)
         for job, name in zip(bar, job_names(jobs), strict=True):
@@ -126,8 +127,10 @@ class Planner(Sweeper):
             if point.identity not in plan:
                 plan[point.identity] = PlannedPoint(tuple(job), name, point, point.state())
                 trees[tuple(job)] = tree
+            studies.append(study)
         if problems:
             raise ConfigError(describe_problems(problems, len(jobs)))
+        _refuse_several(studies)
         if isinstance(self._launcher, PoolLauncher):
             self._launcher.names = {planned.job: planned.name for planned in plan.values()}
             self._launcher.composed = trees
@@ -162,6 +165,17 @@ def _planned_again(planned: PlannedPoint) -> PlannedPoint:
     if was_there and not (planned.point.folder / "record.json").exists():
         return dataclasses.replace(planned, state=State.MISSING)
     return planned
+
+
+def _refuse_several(studies: Sequence[StudySettings]) -> None:
+    """Raise if points differ in what is one for a sweep, such as by `results=out/${seed}`."""
+    for key in ("study", "results", "workers", "sweep"):
+        first, *others = dict.fromkeys(getattr(study, key) for study in studies)
+        if others:
+            raise ConfigError(
+                f"{key}: {first} for one point and {others[0]} for another, but a sweep has one; "
+                "give it a value that is the same for all points"
+            )
 
 
 def _print_plan(plan: Sequence[PlannedPoint], selection: Sequence[PlannedPoint]) -> None:

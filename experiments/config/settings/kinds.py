@@ -38,7 +38,7 @@ def read_number(value: Any) -> float:
         number = math.nan
     if not math.isfinite(number):
         raise PydanticCustomError("number_type", "")
-    return number
+    return number + 0.0  # -0.0 is 0.0: one spelling for equal numbers
 
 
 _READ = BeforeValidator(read_number)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typing_extensions
-from pydantic import TypeAdapter, with_config
+from pydantic import BeforeValidator, TypeAdapter, with_config
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
@@ -28,6 +28,19 @@ from experiments.config.settings.kinds import (
 from mlci.system_check import check_system
 from mlci.systems import System
 
+_EXACT = 2.0**53  # floats below are equal to one whole number alone
+
+
+def _one_spelling(value: Any) -> Any:
+    """A value of any kind, in which a float that is a whole number is one."""
+    if isinstance(value, list | tuple):
+        return [_one_spelling(part) for part in value]
+    is_whole = isinstance(value, float) and value.is_integer() and abs(value) < _EXACT
+    return int(value) if is_whole else value
+
+
+# Of an argument without a type hint: 4 and 4.0 are one.
+_ANY = Annotated[Any, BeforeValidator(_one_spelling)]
 _KINDS: dict[Any, Any] = {float: Number, int: Whole, bool: Flag, str: Word}
 
 
@@ -103,7 +116,7 @@ def _arguments(
     required, optional = typing_extensions.Required, typing_extensions.NotRequired
     fields = {
         name: (required if parameter.default is parameter.empty else optional)[
-            _kind(hints.get(name, Any))
+            _kind(hints.get(name, _ANY))
         ]
         for name, parameter in parameters.items()
     }
@@ -125,7 +138,7 @@ def _kind(hint: Any) -> Any:
         others = [kind for kind in others if kind is not type(None)]
         kind = one_or_list(others[0], lists[0]) if others and lists else [*others, *lists][0]
         return typing.Optional[kind] if type(None) in parts else kind  # noqa: UP045
-    return hint if hint is type(None) else _KINDS.get(hint, Any)
+    return hint if hint is type(None) else _KINDS.get(hint, _ANY)
 
 
 def _target_error(value: Any, words: str) -> ValidationError:

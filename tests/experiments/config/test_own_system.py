@@ -15,8 +15,10 @@ from tiny_point import composed
 from experiments import advise, infer, results, run
 from experiments.config.paths import CHECKOUT, CONF
 from experiments.config.read import read_config
+from experiments.config.settings.system import read_system
 from experiments.tracking import sources
 from experiments.tracking.points import Point
+from experiments.tracking.trees import canonical_json
 from paper_figures import __main__ as figures
 
 SECTION = (CONF / "README.md").read_text().split("\n## Your own system\n")[1]
@@ -138,6 +140,7 @@ def test_folder_whose_config_hides_behind_ours_is_refused(folder: Path) -> None:
 
 MINE = """
 from dataclasses import dataclass
+from typing import Any
 import numpy as np
 from mlci.systems import DoubleIntegrator, System
 class Half(System):
@@ -152,6 +155,9 @@ class Hinted(DoubleIntegrator):
 class Broken(DoubleIntegrator):
     def __init__(self):
         {}["key"]
+class Loose(DoubleIntegrator):
+    def __init__(self, size=2, more=(), any_more: "Any" = None):
+        super().__init__()
 class Wheel(DoubleIntegrator):
     def dynamics(self, states, controls):
         return super().dynamics(states, np.cos(3 * controls))
@@ -216,3 +222,17 @@ def test_dynamics_that_are_not_affine_are_refused_with_a_truth_alone(
     assert "truth: wall needs a safe set, but Wheel.dynamics is not affine in the control" in said
     assert said.rstrip().endswith("as the control; or take truth=none")
     read_config(composed(*words, "truth=none"))
+
+
+def test_equal_numbers_are_one_even_without_a_type_hint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.py").write_text(MINE)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    target = {"_target_": "mine.Loose"}
+    one = read_system({**target, "size": 2.0, "more": [1, -0.0], "any_more": 4})
+    other = read_system({**target, "more": [1.0, 0], "any_more": 4.0})
+    assert canonical_json(one) == canonical_json(other)
+    assert canonical_json(read_system({**target, "size": 2.5})) != canonical_json(other)
+    assert isinstance(read_system({**target, "size": 1e300}).arguments["size"], float)

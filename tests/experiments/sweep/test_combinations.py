@@ -140,3 +140,20 @@ def test_cases_are_read_with_their_places() -> None:
         Case("hydra.sweeper.cases.a", ("case='a'", "y=1", "x=1")),
         Case("hydra.sweeper.cases.a", ("case='a'", "y=2", "x=1")),
     ]
+
+
+@pytest.mark.parametrize(
+    ("word", "values"),
+    [
+        ("dt=range(0.1,0.6,0.1)", [0.1, 0.2, 0.3, 0.4, 0.5]),
+        ("dt=range(0.6,0.1,-0.2)", [0.6, 0.4, 0.2]),
+        ("dt=range(0,1,0.25)", [0.0, 0.25, 0.5, 0.75]),
+        ("dt=range(1e-3,3.1e-3,1e-3)", [0.001, 0.002, 0.003]),
+        ("dt=range(1,4)", [1, 2, 3]),
+        ("dt=range(3.0)", [0.0, 1.0, 2.0]),
+    ],
+)
+def test_a_range_counts_in_decimals(word: str, values: list[float]) -> None:
+    """0.3, as it is written, and not 0.30000000000000004, which is another number."""
+    assert listed(word) == [f"dt={value}" for value in values]
+    assert sorted(listed(word.replace("=", "=shuffle(") + ")")) == sorted(listed(word))
