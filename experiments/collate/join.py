@@ -22,11 +22,19 @@ from experiments.collate.finished import CollateError, FinishedPoint
 from experiments.collate.intervals import study_tables
 from experiments.collate.reliability import reliability
 from experiments.terminal import counted
-from experiments.tracking.files import csv_bytes, digest, exchange_folders, part_of, replacing
+from experiments.tracking.files import (
+    csv_bytes,
+    digest,
+    exchange_folders,
+    part_of,
+    read_file,
+    replace_file,
+    replacing,
+)
 from experiments.tracking.names import inner_path
 from experiments.tracking.points import Point
 from experiments.tracking.study import Study, collated, whole_study, write_collated
-from experiments.tracking.tables import rounded
+from experiments.tracking.tables import agree, rounded
 
 
 def collate(
@@ -39,7 +47,8 @@ def collate(
     """Write one table a measure for all points of a study, and list what they came from.
 
     Rows are ordered by the points' settings, then as each point wrote them. A setting that
-    differs between points, and that the usual columns do not tell apart, becomes a column.
+    differs between points, and that the usual columns do not tell apart, becomes a column. A table
+    that is there already, and agrees with the new one but for rounding, stays as it is.
 
     Args:
         points: the points, in any order; each finished.
@@ -59,18 +68,27 @@ def collate(
     study = whole_study(folder)
     tables = inner_path(folder.parent, folder.name, "tables")
     new = part_of(tables)  # a folder, which takes the place of the old one once all are whole
+    former = study.collated.tables if study and study.collated else {}
     digests: dict[str, str] = {}
+    kept: list[str] = []
+
+    def write(name: str, parts: Iterable[bytes]) -> Path:
+        """Write a table, unless the one that is there says the same; returns its path."""
+        path = new / f"{name}.csv"
+        written = _write(path, parts)
+        digests[path.name] = _keep(path, tables / path.name, former.get(path.name)) or written
+        if digests[path.name] != written:
+            kept.append(path.name)
+        return path
+
     try:
-        joined: dict[str, Path] = {}
-        for name in sorted({name for point in finished for name in point.tables}):
-            joined[name] = new / f"{name}.csv"
-            digests[joined[name].name] = _write(joined[name], joined_parts(name, finished))
+        names = sorted({name for point in finished for name in point.tables})
+        joined = {name: write(name, joined_parts(name, finished)) for name in names}
         for name, frame in _made_tables(finished, joined, study, log).items():
-            digests[f"{name}.csv"] = _write(new / f"{name}.csv", [csv_bytes(rounded(frame))])
-        former = set(study.collated.tables) if study and study.collated else set()
-        _publish(new, tables, former)
+            write(name, [csv_bytes(rounded(frame))])
+        _publish(new, tables, set(former))
         records = {point.identity: point.record for point in finished}
-        write_collated(folder, collated(records, digests))
+        write_collated(folder, collated(records, digests, kept))
     finally:
         shutil.rmtree(new, ignore_errors=True)
     return [tables / name for name in sorted(digests)]
@@ -140,6 +158,24 @@ def _write(path: Path, parts: Iterable[bytes]) -> str:
             file.write(part)
         file.flush()
         return digest(Path(file.name).read_bytes())
+
+
+def _keep(new: Path, old: Path, listed: str | None) -> str | None:
+    """Take the table that is there for a new one that agrees with it; returns its digest, or None.
+
+    Args:
+        new: where the new table is.
+        old: where the one that is there may be.
+        listed: what the study lists as the digest of that; one that has changed since is not kept.
+    """
+    try:
+        before = read_file(old)
+    except OSError:
+        return None
+    if digest(before) != listed or not agree(before, new.read_bytes()):
+        return None
+    replace_file(new, before)
+    return listed
 
 
 def _publish(new: Path, tables: Path, former: set[str]) -> None:

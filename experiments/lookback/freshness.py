@@ -50,8 +50,10 @@ def table_concerns(study: Study, points: Sequence[Facts]) -> list[str]:
         concerns.append("they hold other points than the study's last sweep")
     elif all(point.record for point in points) and points:
         sources = Counter(point.record["source"] for point in points)
-        latest = max(point.record["started"] for point in points)
-        if sources != collated.sources or latest > collated.started[1]:
+        records = {point.point.identity: point.record for point in points}
+        attempts = [int(records[name].get("attempt", 1)) for name in collated.points]
+        # Clocks go back; numbers of attempts do not.
+        if sources != collated.sources or attempts != list(collated.attempts or attempts):
             concerns.append("points have run again since")
     if len(collated.sources) > 1:
         concerns.append(f"they mix {len(collated.sources)} versions of the source")

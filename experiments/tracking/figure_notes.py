@@ -26,7 +26,7 @@ _FIGURES = "paper_figures"  # the package whose modules draw
 
 
 def sentence(folder: Path) -> str:
-    """The origin of a study's data in words: points, commit, date."""
+    """The origin of a study's data in words: points and commit."""
     study = whole_study(folder)
     if study is None or study.collated is None or not study.collated.points:
         return f"study {folder.name}, whose points are not listed"
@@ -37,7 +37,7 @@ def sentence(folder: Path) -> str:
     return (
         f"study {folder.name}, {count} point{'s' * (count > 1)} "
         f"(digest {_points_digest(collated)[:12]}), "
-        f"git commit {commits}{changes}, data of {collated.started[1]}"
+        f"git commit {commits}{changes}"
     )
 
 
@@ -143,7 +143,7 @@ def _drawing_source(module: str) -> str:
 
 
 def _data_origin(folder: Path) -> dict[str, Any] | None:
-    """Points, source, commits and dates behind a study's tables; None if they are not listed."""
+    """Points, source and commits behind a study's tables; None if they are not listed."""
     study = whole_study(folder)
     if study is None or study.collated is None or not study.collated.points:
         return None
@@ -154,7 +154,6 @@ def _data_origin(folder: Path) -> dict[str, Any] | None:
         "sources": dict(collated.sources),
         "commits": list(collated.commits),
         "dirty": collated.dirty,
-        "started": list(collated.started),
     }
 
 

@@ -7,10 +7,15 @@
    "sources": {hash of the source: points, ...},
    "systems": [module, ...], "made_by": hash of the source that made the tables,
    "commits": [git commit, ...], "dirty": whether any had changes,
-   "started": [first, last],                     when its points were run
-   "seconds": of all points, "peak_memory_mb": the most of one,
-   "machines": [name, ...], "versions": [package and version, ...],
-   "tables": {file: sha256, ...}}}
+   "versions": [package and version, ...],
+   "tables": {file: sha256, ...},
+   "kept": [file, ...]}}                         tables that agree with the new ones, and stayed
+
+What differs each time that the same is computed stands in `runs.json` beside it:
+
+{"attempts": [of each point, in that order],
+ "started": [first, last], "seconds": of all points, "peak_memory_mb": the most of one,
+ "machines": [name, ...]}
 """
 
 from __future__ import annotations
@@ -27,6 +32,8 @@ from experiments.tracking.sealed import SealError, read_sealed, write_sealed
 from experiments.tracking.sources import source_hash
 from experiments.tracking.trees import plain
 
+RUNS = "runs.json"
+_OF_RUNS = ("attempts", "started", "seconds", "peak_memory_mb", "machines")
 _COLLATES = "experiments.collate.join"  # named, so that its source counts, and not imported
 
 
@@ -51,6 +58,8 @@ class Collated:
         machines: processor, cores and system of each machine that ran points.
         versions: of Python and the packages that results depend on, spelt "numpy 2.4.6".
         tables: sha256 of each table, by its file's name.
+        kept: those that were there before and agree with the new ones, which differ by rounding.
+        attempts: number of the attempt that each point finished in.
     """
 
     points: tuple[str, ...]
@@ -59,12 +68,14 @@ class Collated:
     made_by: str
     commits: tuple[str, ...]
     dirty: bool
-    started: tuple[str, str]
-    seconds: float
-    peak_memory_mb: int
-    machines: tuple[str, ...]
     versions: tuple[str, ...]
     tables: Mapping[str, str]
+    kept: tuple[str, ...] = ()
+    started: tuple[str, str] = ("", "")
+    seconds: float = 0.0
+    peak_memory_mb: int = 0
+    machines: tuple[str, ...] = ()
+    attempts: tuple[int, ...] = ()
 
 
 def table_source() -> str:
@@ -72,12 +83,15 @@ def table_source() -> str:
     return source_hash([_COLLATES])
 
 
-def collated(records: Mapping[str, Mapping[str, Any]], tables: Mapping[str, str]) -> Collated:
+def collated(
+    records: Mapping[str, Mapping[str, Any]], tables: Mapping[str, str], kept: Iterable[str] = ()
+) -> Collated:
     """What tables came from, of the records of their points.
 
     Args:
         records: by identity, in the order of the tables' rows.
         tables: sha256 of each table, by its file's name.
+        kept: those that were there before and agree with the new ones.
     """
     each = list(records.values())
     started = [record["started"] for record in each]
@@ -100,6 +114,8 @@ def collated(records: Mapping[str, Mapping[str, Any]], tables: Mapping[str, str]
         machines=tuple(sorted({f"{r['cpu']}, {r['cores']} cores, {r['system']}" for r in each})),
         versions=tuple(sorted(versions)),
         tables=tables,
+        kept=tuple(sorted(kept)),
+        attempts=tuple(int(record.get("attempt", 1)) for record in each),
     )
 
 
@@ -124,11 +140,15 @@ class Study:
         return self.folder.name
 
     def save(self) -> None:
-        """Write the listing."""
+        """Write the listing, and beside it what differs each time that the same is computed."""
+        what = plain(self.collated)
+        if self.collated is not None:
+            runs = {key: what.pop(key) for key in _OF_RUNS}
+            write_sealed(_listing(self.folder, RUNS), runs)
         tree = {
             "points": plain(self.points),
             "examples": plain(self.examples),
-            "collated": plain(self.collated),
+            "collated": what,
         }
         write_sealed(_listing(self.folder), tree)
 
@@ -143,9 +163,9 @@ def read_study(folder: Path) -> Study | None:
     try:
         tree = read_sealed(_listing(folder))
         points = {name: tuple(overrides) for name, overrides in tree["points"].items()}
+        what = {**tree["collated"], **_runs(folder)} if tree["collated"] else {}
         lists: dict[str, Any] = {
-            name: tuple(value) if isinstance(value, list) else value
-            for name, value in (tree["collated"] or {}).items()
+            name: tuple(value) if isinstance(value, list) else value for name, value in what.items()
         }
         collated = Collated(**lists) if lists else None
         _check_names(path, points, collated)
@@ -159,9 +179,18 @@ def read_study(folder: Path) -> Study | None:
     return Study(folder, points, tree.get("examples", {}), collated)
 
 
-def _listing(folder: Path) -> Path:
+def _runs(folder: Path) -> dict[str, Any]:
+    """What is told of how a study's points ran; nothing where it cannot be read."""
+    try:
+        runs = read_sealed(_listing(folder, RUNS))
+        return {key: runs[key] for key in _OF_RUNS}
+    except (OSError, SealError, KeyError):
+        return {}
+
+
+def _listing(folder: Path, name: str = "study.json") -> Path:
     """The path of a study's listing, whose folder and name are no links."""
-    return inner_path(folder.parent, folder.name, "study.json")
+    return inner_path(folder.parent, folder.name, name)
 
 
 def _check_names(path: Path, points: Iterable[object], collated: Collated | None) -> None:

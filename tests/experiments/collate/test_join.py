@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -256,7 +257,7 @@ def test_tables_stay_as_they_were_if_collating_fails(tmp_path: Path) -> None:
     with pytest.raises(CollateError, match="not as its point wrote it"):
         collate([point], folder)
     assert {path.name: path.read_bytes() for path in (folder / "tables").iterdir()} == before
-    assert sorted(path.name for path in folder.iterdir()) == ["study.json", "tables"]
+    assert sorted(path.name for path in folder.iterdir()) == ["runs.json", "study.json", "tables"]
 
 
 def test_a_path_in_a_listing_is_never_followed(tmp_path: Path) -> None:
@@ -269,3 +270,39 @@ def test_a_path_in_a_listing_is_never_followed(tmp_path: Path) -> None:
         alter(folder / "study.json", collated={**listed, "tables": {name: "0" * 64}})
         collate([point], folder)
         assert victim.read_text() == "of somebody else"
+
+
+def collated_again(folder: Path, results: Path, *costs: float, **record: Any) -> Study:
+    """The study of one point whose attempts cost so much, run and collated anew."""
+    point = hand_made(results, {**attempts(*costs), **trials(0.5)}, record=record)
+    collate([point], folder)
+    return study_of(folder)
+
+
+def test_a_table_that_agrees_with_the_one_there_stays_as_it_is(tmp_path: Path) -> None:
+    """As after the same points on another machine: other digits, other times, the same tables."""
+    folder, table = tmp_path / "study", tmp_path / "study" / "tables" / "attempts.csv"
+    first = collated_again(folder, tmp_path, 0.25, 1 / 3)
+    before = table.read_bytes()
+    again = collated_again(folder, tmp_path, 0.25, 1 / 3 + 1e-10, started="2027", attempt=2)
+    assert table.read_bytes() == before
+    assert (first.collated.kept, again.collated.kept) == ((), ("attempts.csv",))
+    assert again.collated.tables == first.collated.tables
+    # Times stand in a file of their own.
+    listing = json.loads((folder / "study.json").read_bytes())["collated"]
+    assert not {"started", "seconds", "machines", "peak_memory_mb"} & set(listing)
+    runs = json.loads((folder / "runs.json").read_bytes())
+    assert (runs["started"], runs["attempts"]) == (["2027", "2027"], [2])
+    assert (again.collated.started, again.collated.attempts) == (("2027", "2027"), (2,))
+    # What differs by more, or was changed by somebody, is written anew.
+    other = collated_again(folder, tmp_path, 0.25, 1 / 3 + 1e-7)
+    assert (other.collated.kept, table.read_bytes() != before) == ((), True)
+    table.write_bytes(table.read_bytes().replace(b"0.25", b"0.2500000001"))
+    assert collated_again(folder, tmp_path, 0.25, 1 / 3 + 1e-7).collated.kept == ()
+    assert b"0.25\n" in table.read_bytes()
+
+
+def test_a_study_is_read_without_the_times_of_its_points(tmp_path: Path) -> None:
+    collated_again(tmp_path / "study", tmp_path, 1.0, started="2027")
+    (tmp_path / "study" / "runs.json").write_text("{")
+    assert study_of(tmp_path / "study").collated.started == ("", "")

@@ -54,6 +54,7 @@ def test_tables_come_from_all_records() -> None:
         seconds=3.3,
         peak_memory_mb=100,
         machines=("fast, 2 cores, Linux",),
+        attempts=(1, 1),
         versions=("numpy 2.0", "python 3.11"),
         tables={"summary.csv": "0" * 64},
     )
