@@ -6,7 +6,7 @@ any work starts, and report all that is wrong at once: single values, then what 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -42,6 +42,7 @@ from experiments.config.truth_checks import (
     safe_set_problems,
     truth_problems,
 )
+from experiments.tracking.trees import flatten
 
 __all__ = [
     "ConfigError",
@@ -142,10 +143,11 @@ def plain_tree(config: DictConfig) -> dict[str, Any]:
     """A composed config as resolved dicts and lists, without Hydra's own part.
 
     Raises:
-        ConfigError: an interpolation that leads nowhere.
+        ConfigError: an interpolation that leads nowhere, or to what a record must not hold.
     """
     tree: Any = OmegaConf.to_container(config)
     tree.pop("hydra", None)
+    _refuse(_secret_problems(tree))
     return resolved_tree(OmegaConf.create(tree))
 
 
@@ -160,6 +162,16 @@ def resolved_tree(config: DictConfig) -> dict[str, Any]:
     except OmegaConfBaseException as error:
         raise ConfigError(f"{error.full_key}: {str(error).splitlines()[0]}") from None
     return dict(resolved)
+
+
+def _secret_problems(tree: Mapping[str, Any]) -> Iterator[str]:
+    """Variables of the environment in what records keep; paths are not kept, or not secret."""
+    for key, value in flatten(dict(tree)).items():
+        if "oc.env:" in str(value) and key not in ("results", "demonstrations"):
+            yield (
+                f"{key}: {value} would be kept in records, where everybody can read a variable of "
+                "your environment; write its value, if that is no secret"
+            )
 
 
 def _part(kind: type[_Part], settings: RunSettings) -> _Part:

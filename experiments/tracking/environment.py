@@ -6,8 +6,11 @@ import os
 import platform
 import resource
 import socket
+import stat
 import subprocess
 import sys
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -31,6 +34,13 @@ _PACKAGES = (
 )
 # Untracked files above this size [bytes] are named in a record, but not part of its diff.
 _LARGEST_IN_DIFF = 200_000
+# Untracked files of other kinds may be anything, such as keys.
+_OWN_KINDS = (".py", ".yaml", ".toml")
+# A diff that `git apply` takes, whatever the user has set.
+_PLAIN_DIFF = (
+    *("--binary", "--no-ext-diff", "--no-textconv", "--no-color", "--no-renames"),
+    *("--no-relative", "--src-prefix=a/", "--dst-prefix=b/", "-U3"),
+)
 
 
 def environment(results: Path) -> dict[str, Any]:
@@ -40,15 +50,19 @@ def environment(results: Path) -> dict[str, Any]:
         results: the folder of all results; the checkout's changes since its commit are written to
             its `diffs`, once for all records.
     """
-    commit, diff, untracked = _git_state()
-    name = None
-    if diff:
-        name = f"{digest(diff)[:32]}.diff"
+    code, name = _git_state(), None
+    if code.diff:
+        name = f"{digest(code.diff)[:32]}.diff"
         if not (results / "diffs" / name).exists():
-            replace_file(results / "diffs" / name, diff)
-    dirty = None if commit is None else bool(diff or untracked)
+            replace_file(results / "diffs" / name, code.diff, code.readers)
     return {
-        "git": {"commit": commit, "dirty": dirty, "diff": name, "untracked": untracked},
+        "git": {
+            "commit": code.commit,
+            "reason": code.reason,
+            "dirty": None if code.commit is None else bool(code.diff or code.untracked),
+            "diff": name,
+            "untracked": list(code.untracked),
+        },
         "host": socket.gethostname(),
         "system": platform.platform(),
         "cpu": _processor(),
@@ -61,9 +75,9 @@ def environment(results: Path) -> dict[str, Any]:
 
 def commit_words() -> str:
     """The checkout's commit, and whether files differ from it, in brackets; empty without one."""
-    commit, diff, untracked = _git_state()
-    changed = ", with changes" if diff or untracked else ""
-    return "" if commit is None else f" (commit {commit[:12]}{changed})"
+    code = _git_state()
+    changed = ", with changes" if code.diff or code.untracked else ""
+    return "" if code.commit is None else f" (commit {code.commit[:12]}{changed})"
 
 
 def reset_peak_memory() -> None:
@@ -84,37 +98,95 @@ def peak_memory() -> int:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // unit
 
 
-@cache
-def _git_state() -> tuple[str | None, bytes, list[str]]:
-    """Commit, all changes since then as a diff, and untracked files; `results` is left out.
+@dataclass(frozen=True)
+class _Code:
+    """The checkout's commit and what differs from it; `results` is left out.
 
-    Looked up once: this process's code does not change later.
+    Attributes:
+        commit: None where it is not known, for a `reason`.
+        reason: why it is not.
+        diff: all changes, with the untracked files that are the project's own and nobody's secret.
+        untracked: names of all untracked files.
+        readers: bits of the mode that all files in the diff have.
     """
-    head = _git("rev-parse", "HEAD")
-    if head is None:
-        return None, b"", []
-    without_results = ("--", ".", ":(exclude)results")
-    diff = _git("diff", "--binary", "HEAD", *without_results) or b""
-    names = _git("ls-files", "-z", "--others", "--exclude-standard", *without_results) or b""
-    untracked = [os.fsdecode(name) for name in names.split(b"\0") if name]
-    for name in untracked:
-        path = Path(CHECKOUT or "", name)
-        if path.is_file() and path.stat().st_size <= _LARGEST_IN_DIFF:
-            diff += _git("diff", "--binary", "--no-index", "--", "/dev/null", name) or b""
-    return head.decode().strip(), diff, untracked
+
+    commit: str | None
+    reason: str | None = None
+    diff: bytes = b""
+    untracked: tuple[str, ...] = ()
+    readers: int = 0o666
 
 
-def _git(*arguments: str) -> bytes | None:
-    """Output of a git command in the checkout, or None where there is no git or no commit."""
-    if CHECKOUT is None:  # a repository around an installed wheel is somebody else's
-        return None
-    command = ["git", "--no-optional-locks", *arguments]
+class _NoAnswer(Exception):
+    """Git does not tell; the message says why."""
+
+
+@cache
+def _git_state() -> _Code:
+    """Looked up once: this process's code does not change later."""
     try:
-        done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, timeout=30)
-    except (OSError, subprocess.TimeoutExpired):
-        return None
+        commit = _git("rev-parse", "--verify", "HEAD").decode().strip()
+        without_results = ("--", ".", ":(exclude)results")
+        diff = _git("diff", *_PLAIN_DIFF, "HEAD", *without_results)
+        changed = _names(_git("diff", *_PLAIN_DIFF, "--name-only", "-z", "HEAD", *without_results))
+        names = _git("ls-files", "-z", "--others", "--exclude-standard", *without_results)
+        untracked = _names(names)
+        added = [name for name in untracked if _is_own(Path(CHECKOUT or "", name))]
+        for name in added:
+            diff += _git("diff", *_PLAIN_DIFF, "--no-index", "--", "/dev/null", name)
+    except _NoAnswer as error:
+        return _Code(None, str(error))
+    readers = 0o666
+    for name in (*changed, *added):
+        with suppress(OSError):  # it was removed
+            readers &= Path(CHECKOUT or "", name).lstat().st_mode
+    return _Code(commit, None, diff, untracked, readers)
+
+
+def _names(listed: bytes) -> tuple[str, ...]:
+    """Names that git lists, each ended by a zero."""
+    return tuple(os.fsdecode(name) for name in listed.split(b"\0") if name)
+
+
+def _is_own(path: Path) -> bool:
+    """Whether an untracked file is part of the code: of its kinds, small, and no secret."""
+    try:
+        status = path.lstat()
+    except OSError:
+        return False
+    everybody = stat.S_IRGRP | stat.S_IROTH
+    return (
+        stat.S_ISREG(status.st_mode)
+        and path.suffix in _OWN_KINDS
+        and not path.name.startswith(".")
+        and bool(status.st_mode & everybody)
+        and status.st_size <= _LARGEST_IN_DIFF
+    )
+
+
+def _git(*arguments: str) -> bytes:
+    """Output of a git command in the checkout, whatever the user's settings.
+
+    Raises:
+        _NoAnswer: there is no git, no commit, or it refuses.
+    """
+    if CHECKOUT is None:  # a repository around an installed wheel is somebody else's
+        raise _NoAnswer("the code is an installed package, not a checkout")
+    command = ["git", "--no-optional-locks", "-c", "core.fsmonitor=false", *arguments]
+    # Such as GIT_DIR or GIT_INDEX_FILE, which a hook that starts a sweep has of its own repository.
+    clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
+    clean |= {"LC_ALL": "C", "GIT_CEILING_DIRECTORIES": str(CHECKOUT.parent)}
+    try:
+        done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, timeout=30, env=clean)
+    except FileNotFoundError:
+        raise _NoAnswer("git is not installed") from None
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise _NoAnswer(f"git does not answer: {error}") from None
     # A comparison of two files ends with 1 if they differ.
-    return done.stdout if done.returncode in (0, int("--no-index" in arguments)) else None
+    if done.returncode not in (0, int("--no-index" in arguments)):
+        said = done.stderr.decode(errors="replace").splitlines() or ["nothing"]
+        raise _NoAnswer(f"git says: {said[0]}")
+    return done.stdout
 
 
 @cache

@@ -50,9 +50,16 @@ def read_file(path: Path) -> bytes:
         return file.read()
 
 
-def replace_file(path: Path, data: bytes) -> None:
-    """Write a file so that, whatever happens, it is the old one or the new one."""
+def replace_file(path: Path, data: bytes, readers: int = 0o777) -> None:
+    """Write a file so that, whatever happens, it is the old one or the new one.
+
+    Args:
+        path: the file.
+        data: its content.
+        readers: bits of the mode that it may have at most, where the umask allows more.
+    """
     with replacing(path) as file:
+        os.fchmod(file.fileno(), stat.S_IMODE(os.fstat(file.fileno()).st_mode) & readers)
         file.write(data)
 
 

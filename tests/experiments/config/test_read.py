@@ -136,6 +136,7 @@ COMMANDS = [
     ("dt=[1", "dt=[1: cannot be read as key=value"),
     ("dt", "dt: cannot be read as key=value"),
     ("dt=fast", "dt: 'fast' is not a finite number"),
+    ("truth.name=${oc.env:HOME}", "truth.name: ${oc.env:HOME} would be kept in records, where"),
     ("dt=${nothing}", "dt: Interpolation key 'nothing' not found"),
     ("dt=0.2,0.25", "dt: several values need -m, for a sweep, or dt=[0.2,0.25], for a list"),
     (
