@@ -98,6 +98,7 @@ def save(figure: Figure, path: Path, source: str = "") -> Path:
         for suffix, entries in metadata.items():
             content = io.BytesIO()
             figure.savefig(content, format=suffix[1:], dpi=DPI, metadata=entries)
+            figure.set_layout_engine("none")  # it is solved once, for the PNG
             replace_file(path.with_name(path.name + suffix), content.getvalue())
     plt.close(figure)
     return path.with_name(f"{path.name}.png")

@@ -10,7 +10,7 @@ import ast
 import importlib.util
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import cache
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.metadata import PackageNotFoundError, version
@@ -113,31 +113,37 @@ def _read_source(name: str) -> tuple[str, tuple[str, ...]]:
     return digest("\n".join(_words(tree)).encode()), tuple(imported)
 
 
-def _words(node: ast.AST) -> Iterator[str]:
+def _words(tree: ast.AST) -> list[str]:
     """A syntax tree as words, without what changes no result; the same for all versions of Python.
 
     A field that is empty is left out, as some versions have more of them than others.
     """
-    yield f"({type(node).__name__}"
-    for name in node._fields:
-        value = getattr(node, name, None)
-        if isinstance(value, ast.AST):
-            yield name
-            yield from _words(value)
-        elif isinstance(value, list):
-            if name == "body":
-                value = [part for part in value if not _is_silent(part)]
-            if value:
-                yield f"{name}["
-                for part in value:
-                    if isinstance(part, ast.AST):
-                        yield from _words(part)
-                    else:
-                        yield repr(part)
-                yield "]"
-        elif value is not None and name not in ("kind", "type_comment"):
-            yield f"{name}={value!r}"
-    yield ")"
+    words: list[str] = []
+
+    def add(node: ast.AST) -> None:
+        words.append(f"({type(node).__name__}")
+        for name in node._fields:
+            value = getattr(node, name, None)
+            if isinstance(value, ast.AST):
+                words.append(name)
+                add(value)
+            elif isinstance(value, list):
+                if name == "body":
+                    value = [part for part in value if not _is_silent(part)]
+                if value:
+                    words.append(f"{name}[")
+                    for part in value:
+                        if isinstance(part, ast.AST):
+                            add(part)
+                        else:
+                            words.append(repr(part))
+                    words.append("]")
+            elif value is not None and name not in ("kind", "type_comment"):
+                words.append(f"{name}={value!r}")
+        words.append(")")
+
+    add(tree)
+    return words
 
 
 def _is_silent(node: ast.AST) -> bool:

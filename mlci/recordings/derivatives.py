@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-from scipy.signal import savgol_filter
+import scipy  # loads scipy.signal, which takes half a second, when it is first used
 
 from mlci.spaces import Floats, StateSpace
 
@@ -64,7 +64,7 @@ def smooth_derivative(values: Floats, time: Floats, window: float) -> Floats:
     even = time[0] + step * np.arange(count)
     is_even = np.all(np.abs(time - even) <= _EVEN * step)
     samples = values if is_even else np.interp(even, time, values)
-    slope = savgol_filter(samples, size, _DEGREE, deriv=1, delta=step)
+    slope = scipy.signal.savgol_filter(samples, size, _DEGREE, deriv=1, delta=step)
     return np.asarray(slope if is_even else np.interp(time, even, slope))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
+import scipy  # loads scipy.ndimage when it is first used
 
 from mlci.spaces import Floats
 from mlci.systems import System
@@ -74,7 +74,7 @@ def spikes(system: System, path: Floats, time: Floats) -> list[Spike]:
     if len(path) < 2 * _REACH + 1:
         return []
     window = (2 * _REACH + 1, 1)
-    middle = median_filter(path, size=window, mode="nearest")
+    middle = scipy.ndimage.median_filter(path, size=window, mode="nearest")
     away = np.abs(path - middle)
     fastest = np.zeros(path.shape[1])
     for control in system.control_box.vertices():
