@@ -16,7 +16,9 @@ from mlci.answers import Answer
 from mlci.inference import Inference
 from mlci.spaces import Floats, Ints
 
-MOST_NUMBERS = 100_000  # of a matrix on the page, so that it stays readable by a browser
+# A page stays a megabyte or so, and quick to write where each stop estimates a rate anew.
+MOST_NUMBERS = 40_000  # of a matrix
+MOST_STOPS = 101
 
 
 def page_numbers(answer: Answer) -> dict[str, Any]:
@@ -56,7 +58,7 @@ def detailed_regions(inference: Inference) -> Ints:
 
 def stops(demonstrations: int, regions: int) -> Ints:
     """Numbers of demonstrations at which the slider halts: each, or evenly spread ones."""
-    most = max(MOST_NUMBERS // max(regions, 1), 2)
+    most = max(min(MOST_NUMBERS // max(regions, 1), MOST_STOPS), 2)
     if demonstrations + 1 <= most:
         return np.arange(demonstrations + 1)
     return np.unique(np.linspace(0, demonstrations, most).round().astype(int))

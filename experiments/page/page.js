@@ -4,7 +4,7 @@
   const byId = (id) => document.getElementById(id);
   const FEW = 10, BEST = 5, LITTLE = 100; // rows; regions that are numbered; thousandths of a nat
   const column = new Map(data.detailed.map((region, k) => [region, k]));
-  const unseen = new Set(data.unseen);
+  const unseen = new Set(data.unseen), entered = data.entered.map((regions) => new Set(regions));
   const state = { stop: data.stops.length - 1, region: 0, plane: 0, all: false };
 
   // Words for the numbers, which are whole thousandths.
@@ -32,7 +32,7 @@
   const rank = (i) => data.rank[state.stop][i];
   const gain = (i) => data.gain[state.stop][i];
   const chance = (i) => data.chance[state.stop][i];
-  const entries = (i) => data.entered.slice(0, count()).filter((regions) => regions.includes(i)).length;
+  const entries = (i) => entered.slice(0, count()).filter((regions) => regions.has(i)).length;
   const order = () => data.regions.map((_, i) => i).sort((a, b) => rank(a) - rank(b) || a - b);
 
   // A region's colour: the square root of its gain on the ramp.
@@ -111,7 +111,7 @@
   // What demonstration j says of region i, and why.
   const reason = (j, i) => {
     const k = column.get(i);
-    if (data.entered[j].includes(i)) return { kind: "against", why: "enters the region" };
+    if (entered[j].has(i)) return { kind: "against", why: "enters the region" };
     if (!data.reachable[j]) return { kind: "none", why: "the model cannot reach its goal" };
     if (data.decided[j].includes(i)) {
       return { kind: "none", why: "only the cell of its start or goal makes entering certain" };
@@ -123,12 +123,12 @@
   };
 
   const facts = (i) => {
-    const entered = entries(i);
+    const visits = entries(i);
     return [
       data.regions[i][1][0].toUpperCase() + data.regions[i][1].slice(1) + ".",
       "Place " + place(rank(i)) + " of " + data.regions.length + "; how likely: " + of100(chance(i))
         + " of 100; evidence: " + nat(gain(i)) + (Number.isInteger(gain(i)) ? " nat" : "") + ".",
-      entered ? "Entered by " + plural(entered, "demonstration") + "." : "Entered by no demonstration.",
+      visits ? "Entered by " + plural(visits, "demonstration") + "." : "Entered by no demonstration.",
       unseen.has(i) ? "It is on the way of no task that was recorded: keeping out says nothing." : "",
     ].filter(Boolean).join(" ");
   };
