@@ -41,7 +41,7 @@ def page_numbers(answer: Answer) -> dict[str, Any]:
         "phi": shares(inference.phi[:, detailed]),
         "evidence": nats(inference.evidence[:, detailed]),
         "entered": _places(inference.violated),
-        "decided": _places(inference.decided_by_cell & ~inference.violated),
+        "decided": _places(inference.decided_by_cell),
         "reachable": inference.reachable.tolist(),
         **_after_each(inference),
     }
