@@ -20,7 +20,7 @@ from experiments.app import DONE, FAILED, run_command
 from experiments.config.read import ConfigError, read_advice_config
 from experiments.config.settings import AdviceSettings
 from experiments.console import noise_words
-from experiments.terminal import table_lines, words
+from experiments.terminal import entry, table_lines, terminal_width, words
 from mlci.demonstrations import Task
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.diagnosis import MOST_UNREACHABLE, Diagnosis, diagnose
@@ -97,23 +97,23 @@ def main() -> int:
 def advise(settings: AdviceSettings, log: Callable[[str], None]) -> int:
     """Try the discretisations, print what was found and recommend one; returns the exit status."""
     tasks = _tasks(settings)
-    log(
-        f"tasks           {len(tasks)} of {settings.pairs} that were drawn, {settings.horizon:g} s "
-        "each: those whose cheapest path keeps within the\n"
-        "                ranges of states and controls, so that a good tabular agent can do them"
+    text = (
+        f"{len(tasks)} of {settings.pairs} that were drawn, {settings.horizon:g} s each: those "
+        "whose cheapest path keeps within the ranges of states and controls, so that a good "
+        "tabular agent can do them"
     )
-    candidates = list(_try_all(settings, tasks))
-    for line in table_lines([_HEAD, *(_row(each) for each in candidates)]):
+    for line in entry("tasks", text):
         log(line)
-    log(
-        "goals: share of the tasks' goals that the tabular agent reaches; frozen: largest share of "
-        "cells whose number in a dimension no action changes;\ncells/step: crossed on average; "
-        "leave: share of the moves that leave the state space; form, task: processor time to form "
-        "the model and to infer from a task"
-    )
+    candidates = list(_try_all(settings, tasks))
+    for line in table_lines([_HEAD, *(_row(each) for each in candidates)], terminal_width()):
+        log(line)
+    for title, text in _COLUMNS.items():
+        for line in entry(title, text):
+            log(line)
     for candidate in candidates:
         for number, concern in enumerate(candidate.concerns):
-            log(f"{'' if number else _name(candidate):24}{concern}")
+            for line in entry("" if number else _name(candidate), concern):
+                log(line)
     chosen, reasons = recommend(candidates)
     if chosen is None:
         log("recommended     none: raise budget, add larger dts or grids, or try another remedy")
@@ -123,7 +123,8 @@ def advise(settings: AdviceSettings, log: Callable[[str], None]) -> int:
         f"recommended     grid.shape=[{shape}] dt={chosen.dt:g} transition.samples={chosen.samples}"
     )
     for reason in reasons:
-        log(f"                {reason}")
+        for line in entry("", reason):
+            log(line)
     return DONE
 
 
@@ -257,6 +258,14 @@ def _actions(settings: AdviceSettings) -> Floats:
     return settings.action_values
 
 
+_COLUMNS = {
+    "goals": "share of the tasks' goals that the tabular agent reaches",
+    "frozen": "largest share of cells whose number in a dimension no action changes",
+    "cells/step": "crossed on average",
+    "leave": "share of the moves that leave the state space",
+    "noise": "control noise var(u) dt, of what it would be without limits",
+    "form, task": "processor time to form the model, and to infer from a task",
+}
 _HEAD = (
     "grid", "states", "dt", "samples", "verdict", "goals", "frozen", "cells/step", "leave", "noise",
     "form [s]", "task [ms]",

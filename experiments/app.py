@@ -80,16 +80,17 @@ def run_command(
     from experiments.config.explain import explain, of_config
     from experiments.config.paths import CONF
     from experiments.config.read import ConfigError, plain_tree
+    from experiments.terminal import complain
 
     def task(config: DictConfig) -> None:
         """The work, outside Hydra's own handling of errors."""
         try:
             status = act(plain_tree(config))
         except ConfigError as error:
-            print(error, file=sys.stderr)
+            complain(str(error))
             raise SystemExit(REFUSED) from None
         except failures as error:
-            print(error, file=sys.stderr)
+            complain(str(error))
             raise SystemExit(FAILED) from None
         except Exception:
             traceback.print_exc()
@@ -104,14 +105,14 @@ def run_command(
     except KeyboardInterrupt:
         return STOPPED
     except failures as error:
-        print(error, file=sys.stderr)
+        complain(str(error))
         return FAILED
     except Exception as error:
         if isinstance(error, OSError) and not of_config(error):
             # No room or no right to write: nothing that a config could mend.
-            print(f"{error}; what has finished is kept", file=sys.stderr)
+            complain(f"{error}; what has finished is kept")
             return FAILED
-        print(explain(error), file=sys.stderr)
+        complain(explain(error))
         return REFUSED
     return DONE
 

@@ -29,7 +29,7 @@ from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import plausibilities, read_recordings, together
 from experiments.point.truth_tables import dimension_table
 from experiments.progress import begin, steps_shown
-from experiments.terminal import counted, entry
+from experiments.terminal import complain, counted, entry
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.store import Store
@@ -72,9 +72,9 @@ def infer(settings: RecordedSettings) -> int:
     demonstrations, problems, notes = readings
     begin("")
     for problem in problems:
-        print(f"not used: {problem}", file=sys.stderr)
+        complain(f"not used: {problem}")
     for line in together(notes):
-        print(f"note: {line}", file=sys.stderr)
+        complain(f"note: {line}")
     if not demonstrations:
         print(f"no demonstration could be used: {len(problems)} lack what is named above")
         return FAILED

@@ -11,7 +11,6 @@ if __name__ == "__main__":  # before all that takes time to import
 
 import argparse
 import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ from experiments.lookback.views import (
     study_status,
     summary_list,
 )
-from experiments.terminal import counted
+from experiments.terminal import complain, counted, terminal_width
 from experiments.tracking.files import replace_file
 from experiments.tracking.points import State
 from experiments.tracking.study import Study
@@ -76,12 +75,12 @@ def main() -> int:
             print(line)
         sys.stdout.flush()
     except ArchiveError as error:
-        print(error, file=sys.stderr)
+        complain(str(error))
         return 2
     except BrokenPipeError:  # somebody has read enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
-        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
+        complain(f"{error.filename}: {error.strerror}")
         return 2
     return 0
 
@@ -143,9 +142,9 @@ def _parser() -> argparse.ArgumentParser:
 def _list(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """Studies, or points."""
     if options.study is None and not options.state:
-        return study_list(archive, _width())
+        return study_list(archive, terminal_width())
     study = None if options.study in (None, "points") else archive.study(options.study)
-    return point_list(archive, study, options.state or (), _width())
+    return point_list(archive, study, options.state or (), terminal_width())
 
 
 def _status(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
@@ -169,7 +168,7 @@ def _show(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
 def _diff(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """What differs between two points."""
     one, two = (_point(archive, name) for name in (options.one, options.two))
-    return differences(archive, one, two, _width())
+    return differences(archive, one, two, terminal_width())
 
 
 def _query(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
@@ -181,7 +180,7 @@ def _query(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     matches = select([point for point in points if point.record], options.conditions)
     if not matches:
         raise ArchiveError(f"no finished point has {' '.join(options.conditions)}")
-    return summary_list(matches, _width())
+    return summary_list(matches, terminal_width())
 
 
 def _export(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
@@ -200,7 +199,7 @@ def _export(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     if is_shipped(points):
         concerns.append("some points are not stored here, and their rows are left out")
     if concerns:
-        print(f"{options.study}: {', '.join(concerns)}", file=sys.stderr)
+        complain(f"{options.study}: {', '.join(concerns)}")
     if options.out is None:
         yield data.decode().rstrip("\n")
     else:
@@ -243,8 +242,3 @@ def _point(archive: Archive, name: str) -> Facts:
     if isinstance(item, Study):
         raise ArchiveError(f"{name}: is a study; give a point (see: list {name})")
     return item
-
-
-def _width() -> int | None:
-    """Columns of the terminal; None where there is none."""
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None

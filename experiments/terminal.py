@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 import textwrap
 from collections.abc import Iterator, Sequence
+from typing import TextIO
 
 WIDTH = 80  # columns of a terminal
 
@@ -23,11 +26,41 @@ def entry(title: str, text: str, hang: int = 0) -> list[str]:
     return textwrap.wrap(
         text,
         WIDTH,
-        initial_indent=f"{title:16}",
+        initial_indent=f"{title:15} ",
         subsequent_indent=" " * (16 + hang),
         break_long_words=False,
         break_on_hyphens=False,
     )
+
+
+def fitted(text: str, stream: TextIO) -> str:
+    """A text as it is, or, for a terminal, with lines that break between words."""
+    if not stream.isatty():
+        return text
+    return "\n".join(
+        part
+        for line in text.splitlines()
+        for part in textwrap.wrap(
+            line,
+            shutil.get_terminal_size().columns,
+            subsequent_indent="  ",
+            break_long_words=False,
+            break_on_hyphens=False,
+            drop_whitespace=True,
+            replace_whitespace=False,
+        )
+        or [""]
+    )
+
+
+def complain(text: str) -> None:
+    """Print what is wrong."""
+    print(fitted(text, sys.stderr), file=sys.stderr)
+
+
+def terminal_width() -> int | None:
+    """Columns of the terminal that is printed to; None where there is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 def table_lines(rows: Sequence[Sequence[object]], width: int | None = None) -> Iterator[str]:

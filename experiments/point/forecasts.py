@@ -100,7 +100,7 @@ def recorded_calibration(
     )
 
     def compute() -> dict[str, np.ndarray]:
-        begin(f"simulating {TRIALS} tasks like these to calibrate the evidence, once for them")
+        begin(f"simulating {TRIALS} tasks like these, to calibrate the evidence")
         return _arrays(
             calibrate(model, tasks, trials=TRIALS, exact_ends=exact_ends, crossing=crossing)
         )

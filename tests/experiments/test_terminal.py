@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
 
-from experiments.terminal import WIDTH, counted, entry, job_names, table_lines
+from experiments.terminal import WIDTH, counted, entry, fitted, job_names, table_lines
 
 
 def test_an_entry_breaks_between_words_alone() -> None:
@@ -36,3 +38,17 @@ def test_a_job_is_named_by_what_tells_it_from_the_others(
     jobs: list[list[str]], names: list[str]
 ) -> None:
     assert job_names(jobs) == names
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_message_breaks_between_words_on_a_terminal_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "21")
+    text = "results: nothing can be written\n  raised  a-long-name"
+    assert fitted(text, io.StringIO()) == text
+    assert fitted(text, Terminal()) == "results: nothing can\n  be written\n  raised  a-long-name"
