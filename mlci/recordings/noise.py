@@ -86,7 +86,7 @@ def spikes(system: System, path: Floats, time: Floats) -> list[Spike]:
     runs = np.split(out, np.flatnonzero(np.diff(out) > 1) + 1) if len(out) else []
     found = []
     for run in runs:
-        if len(run) <= _REACH and run[0] > 0 and run[-1] < len(path) - 1:
+        if run[0] > 0 and run[-1] < len(path) - 1:
             row = run[int(np.argmax(excess[run]))]
             d = int(np.argmax(away[row] / np.where(limit > 0, limit, np.inf)))
             found.append(Spike(int(run[0]), int(run[-1]), d, float(away[row, d])))

@@ -212,9 +212,11 @@ def _spike_doubts(
     at = _listed([f"{time[spike.first]:.6g} s" for spike in bad])
     widest = max(bad, key=lambda spike: spike.size / space.bounds.widths[spike.dimension])
     stand = "a sample jumps" if len(bad) == 1 and bad[0].first == bad[0].last else "samples jump"
+    around = max(time[spike.last + 1] - time[spike.first - 1] for spike in bad)
+    enough = np.ceil(1000 * around - 1e-6) / 1000
     decides = (
-        f"; the path enters {alone} there alone, which this refutes: correct the file, or let "
-        "crossing.time leave short visits out"
+        f"; the path enters {alone} there alone, which this refutes: correct the file, or leave "
+        f"such visits out by crossing.time={enough:g}"
         if alone
         else ", which decides no region"
     )

@@ -41,7 +41,7 @@ def test_a_sample_that_jumps_out_and_back_is_a_spike() -> None:
     assert found[1].size == pytest.approx(4.0, abs=0.2)
 
 
-@pytest.mark.parametrize("noise_size", [0.0, 0.03])
+@pytest.mark.parametrize("noise_size", [0.0, 0.03, 0.5])
 def test_smooth_and_noisy_paths_have_no_spikes(noise_size: float) -> None:
     rng = np.random.default_rng(2)
     found: list[Spike] = []

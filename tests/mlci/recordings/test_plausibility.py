@@ -78,7 +78,8 @@ def test_a_bad_sample_is_named_with_what_it_alone_decides() -> None:
     (text,) = words(check(path))
     assert text.startswith("at 2.5 s a sample jumps out and back by up to ")
     assert f"the path enters regions {', '.join(alone[:6])}" in text
-    (text,) = words(check(path, crossing=Crossing(time=0.05)))
+    assert text.endswith("by crossing.time=0.02")
+    (text,) = words(check(path, crossing=Crossing(time=0.02)))
     assert text.endswith("faster than the dynamics allow, which decides no region")
 
 
