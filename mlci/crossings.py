@@ -7,7 +7,7 @@ last. Both are exact on the polyline through the samples.
 A *stay* is a longest interval of time in which the path is in the interior of a region. Its depth
 is the largest share of the region's width that the path keeps to the nearest side, in the dimension
 in which it keeps least: 0 at a side, 0.5 in the middle. A side at the border of the state space,
-which no path can cross, does not count.
+which no path can cross, does not count: at the border itself a path is deepest.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ _DEEP = 2.0  # standard deviations of the noise: a crossing that is less deep ma
 _MOST_SHOWN = 6
 # What makes a dimension move so many times faster than the others say.
 _FACTORS = {
-    57.296: "is it in degrees?",
+    57.296: "is it in degrees? then units=UNITS",
     1 / 57.296: "was it in radians before it was converted from degrees?",
     1000.0: "is it in thousandths of its unit, as millimetres?",
     0.001: "is time in ms, or the state in thousands of its unit?",
@@ -163,7 +163,9 @@ def _motion_doubts(system: System, path: Floats, moves: Motion) -> Iterator[tupl
         causes = [text for known, text in _FACTORS.items() if abs(factor / known - 1) < 0.03]
         if causes and "degrees" in causes[0] and "rad" not in space.units[d]:
             causes = []
+        units = f"{{{space.names[d]}: {space.units[d].replace('rad', 'deg')}}}"
         cause = causes[0] if causes else "are units, columns and times right?"
+        cause = cause.replace("UNITS", units)
         yield MOTION, f"{name} moves {times:.3g} times {than} than {sources} says {off}: {cause}"
 
 

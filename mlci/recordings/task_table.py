@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from mlci.recordings.columns import shortened
 from mlci.recordings.recording import goal_columns
 from mlci.spaces import Box, Floats, StateSpace
 
@@ -90,9 +91,9 @@ def unmatched(table: Mapping[str, Ends], trials: Iterable[str]) -> list[str]:
     needless = [name for name in table if name not in names]
     phrases = []
     if lacking:
-        phrases.append(f"has no row for {', '.join(lacking)}: start and goal are read off the path")
+        phrases.append(f"has no row for {shortened(lacking)}: start and goal are read off the path")
     if needless:
-        phrases.append(f"has rows for trials that are not there: {', '.join(needless)}")
+        phrases.append(f"has rows for trials that are not there: {shortened(needless)}")
     return phrases
 
 

@@ -108,11 +108,11 @@ def test_a_stay_goes_on_across_the_seam_of_an_angle():
 
 
 def test_a_side_at_the_border_of_the_space_has_no_depth():
-    edges = Regions(CYLINDER, [[1.0, 5.0], [1.0, -7.0]], [[2.0, 7.0], [2.0, -5.0]])
+    edges = Regions(CYLINDER, [[1.0, 5.0], [-np.inf, -6.0]], [[2.0, 7.0], [np.inf, -5.0]])
     path = np.array([[1.5, 6.0], [1.5, -6.0]])
-    assert stays(edges, path, np.arange(2.0)).depth == pytest.approx([0.5, 0.5])
+    assert stays(edges, path, np.arange(2.0)).depth == pytest.approx([0.5, 1.0])
     unit = np.array([0.1, 0.1])
-    assert stays(edges, path, np.arange(2.0), unit).depth == pytest.approx([5.0, 5.0])
+    assert stays(edges, path, np.arange(2.0), unit).depth == pytest.approx([5.0, 10.0])
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ def test_there_is_no_doubt_about_a_motion_of_the_system(integrator) -> None:
 def test_an_angle_in_degrees_is_named_with_its_factor() -> None:
     (text,) = words(check(SMOOTH * [180 / np.pi, 1.0]))
     assert text.startswith("angle moves 57.3 times faster than angular velocity says (residual: ")
-    assert text.endswith("rad/s): is it in degrees?")
+    assert text.endswith("rad/s): is it in degrees? then units={angle: deg}")
 
 
 def test_a_control_range_that_cannot_be_is_named() -> None:
