@@ -27,7 +27,7 @@ from mlci.diagnosis import MOST_UNREACHABLE, Diagnosis, diagnose
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.recursions import reachable_cells
-from mlci.spaces import Bools, Floats
+from mlci.spaces import Bools
 from mlci.tabular import discretize
 
 _SAMPLES = 100  # of the paths that show which tasks can be done
@@ -208,7 +208,7 @@ def _try_all(settings: AdviceSettings, tasks: Sequence[Task]) -> Iterator[Candid
             candidate = _try(settings, grid, dt, samples, tasks)
             yield candidate
             bar.update()
-            moves = grid.size * len(_actions(settings)) * settings.remedy ** len(grid.shape)
+            moves = grid.size * len(settings.action_values) * settings.remedy ** len(grid.shape)
             if not candidate.accepted and samples < settings.remedy and moves <= _MOST_MOVES:
                 todo.insert(0, (grid, dt, settings.remedy))
                 bar.total = len(todo) + bar.n
@@ -219,7 +219,9 @@ def _try(
 ) -> Candidate:
     """Form a tabular model and see what it can do."""
     before = time.process_time()
-    model = discretize(settings.model, grid, _actions(settings), dt, settings.candidates, samples)
+    model = discretize(
+        settings.model, grid, settings.action_values, dt, settings.candidates, samples
+    )
     formed = time.process_time() - before
     merged, distributions = (
         model.merged,
@@ -251,11 +253,6 @@ def _try(
         discretize_s=formed,
         task_s=task_s,
     )
-
-
-def _actions(settings: AdviceSettings) -> Floats:
-    """(A, m) the actions."""
-    return settings.action_values
 
 
 _COLUMNS = {
