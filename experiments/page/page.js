@@ -168,7 +168,8 @@
     ["against", "speaks against it", "speak against it", "Enters it."],
     ["none", "says nothing", "say nothing", ""],
   ];
-  const reasonsOf = (i) => KINDS.flatMap(([kind, one, many, text]) => {
+  const kindsOf = (i) => gain(i) === null ? [KINDS[1], KINDS[0], KINDS[2]] : KINDS; // what decides, first
+  const reasonsOf = (i) => kindsOf(i).flatMap(([kind, one, many, text]) => {
     const found = data.names.map((name, j) => ({ name, j, ...reason(j, i) }))
       .filter((each) => each.j < count() && each.kind === kind);
     const heading = element("h3", plural(found.length, "demonstration") + " " + (found.length === 1 ? one : many));
