@@ -218,3 +218,11 @@ def test_a_name_that_is_no_text_is_shown(tmp_path: Path) -> None:
     path.write_text(HEADER + "0,1,0\n1,1,0\n")
     (demonstration,), *_ = read(tmp_path)
     assert demonstration.name == "d\\udcff"
+
+
+def test_nanoseconds_since_1970_lose_no_digit(tmp_path: Path) -> None:
+    """As floating-point numbers they would be rounded to 256 ns."""
+    rows = [f"{1_700_000_000_000_000_000 + 1000 * k},1,0\n" for k in range(5)]
+    (tmp_path / "a.csv").write_text(HEADER + "".join(rows))
+    (demonstration,), *_ = read(tmp_path / "a.csv")
+    np.testing.assert_allclose(demonstration.times, np.arange(5) * 1e-6, rtol=1e-12)
