@@ -31,6 +31,7 @@ _SLURM = {
 _DASK = {
     "jobs": 100,  # the points are dealt to them
     "scheduler": None,  # address of a running cluster; null starts one in this process
+    "tls": None,  # {ca_file: FILE, cert: FILE, key: FILE} of a cluster that asks for them
     "threads": "${workers}",  # of the cluster in this process
     "fail_fast": "${sweep.fail_fast}",
 }

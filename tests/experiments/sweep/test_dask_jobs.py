@@ -1,5 +1,6 @@
 """The Dask launcher with a cluster of its own process; schedulers and tables: tests/stress."""
 
+import os
 from pathlib import Path
 from types import ModuleType
 
@@ -54,3 +55,35 @@ def test_engine_without_its_extra_is_refused(
     assert done.returncode == 2
     assert done.stderr == f"hydra/launcher: {engine} needs pip install 'mlci[{engine}]'\n"
     assert not list(tmp_path.iterdir())
+
+
+def test_a_cluster_in_this_process_is_reached_from_this_machine_alone() -> None:
+    before = listening()
+    client = dask_jobs.DaskLauncher(1, None, 1, fail_fast=False)._client()
+    try:
+        opened = listening() - before
+        assert client.submit(sum, [1, 2]).result(timeout=30) == 3
+        assert {address for address, _ in opened} <= {"0100007F"}
+    finally:
+        client.close()
+
+
+def listening() -> set[tuple[str, str]]:
+    """Address and port, in hexadecimal, at which this process listens."""
+    mine = {os.readlink(link) for link in Path("/proc/self/fd").iterdir() if link.is_symlink()}
+    rows = [
+        line.split()
+        for version in ("tcp", "tcp6")
+        for line in Path(f"/proc/self/net/{version}").read_text().splitlines()[1:]
+    ]
+    listed = [row[1] for row in rows if row[3] == "0A" and f"socket:[{row[9]}]" in mine]
+    return {tuple(place.split(":")) for place in listed}
+
+
+def test_tls_needs_all_its_files(tmp_path: Path) -> None:
+    words = ["-m", *TINY, f"results={tmp_path}", *DASK, "hydra.launcher.tls={ca_file: x}"]
+    done = run_here(run_command.main, *words, folder=tmp_path)
+    assert (done.returncode, done.stderr) == (
+        2,
+        "hydra.launcher.tls: give it ca_file, cert, key, each a file\n",
+    )
