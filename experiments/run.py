@@ -28,6 +28,8 @@ _SWEEP = ("params", "settings", "cases")
 def main() -> int:
     """Run the command line's point or sweep; returns the exit status."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a clean stop, as after Ctrl-C
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # which it is below nohup
+        signal.signal(signal.SIGHUP, signal.default_int_handler)
     register_plugins()
     status = run_command("config", _run_single, failures=(SweepFailed, CollateError, NoAnswer))
     if status == STOPPED:

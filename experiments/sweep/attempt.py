@@ -79,9 +79,10 @@ def record_death(point: Point, error: Exception, after: int) -> dict[str, Any]:
         # Another process may have run it since.
         if not point.is_done() and not _failure_after(point, after):
             number = max(point.attempts(), after + 1)
-            trace, late = "", False
+            trace, late = "", isinstance(error, TimeoutError)
             if point.attempts() > after:
-                trace, late = take_crash_trace(point, run_in_worker.__name__)
+                trace, told = take_crash_trace(point, run_in_worker.__name__)
+                late = late or told
             message = "still running at its time limit" if late else _describe(error)
             write_failure(point, "timeout" if late else "died", message, trace, number)
     if failure := _failure_after(point, after):

@@ -25,6 +25,7 @@ from experiments.sweep.plan import Job
 
 _BAR = "{percentage:3.0f}%|{bar:20}| {n}/{total} points, {elapsed} gone, {remaining} left{postfix}"
 _REFRESH = 0.5  # [s]
+_GRACE = 5.0  # [s] after its time limit in which a worker may end by itself
 
 
 class PoolLauncher(Launcher):
@@ -74,7 +75,7 @@ class PoolLauncher(Launcher):
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 for job in islice(waiting, self.workers):
-                    running[pool.schedule(_work, [self.task, self.composed[job]])] = job
+                    running[self._schedule(pool, job)] = job
             finally:
                 signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
             while running:
@@ -96,7 +97,7 @@ class PoolLauncher(Launcher):
                         print(f"[{ended}/{len(jobs)}] {self._name(job)}: {end}", flush=True)
                     if not (self.fail_fast and failures):
                         for job in islice(waiting, 1):
-                            running[pool.schedule(_work, [self.task, self.composed[job]])] = job
+                            running[self._schedule(pool, job)] = job
             self._update(bar, failures, [])
         finally:
             pool.stop()
@@ -106,6 +107,18 @@ class PoolLauncher(Launcher):
             pool.join()
             bar.close()
         return [returns[job] for job in jobs]
+
+    def _schedule(self, pool: ProcessPool, job: Job) -> Future[Any]:
+        """Hand a job to a worker, which is killed if it is still there well after its time limit.
+
+        It ends itself at the limit, and tells where it was; but not if it was stopped (SIGSTOP).
+        """
+        tree = self.composed[job]
+        limit = tree.get("sweep", {}).get("time_limit")
+        future: Future[Any] = pool.schedule(
+            _work, [self.task, tree], timeout=None if limit is None else limit + _GRACE
+        )
+        return future
 
     def _update(self, bar: tqdm[NoReturn], failures: int, running: Iterable[Job]) -> None:
         """Write the number of failures, and what runs now, at the end of the bar."""
@@ -140,6 +153,8 @@ def _error_of(future: Future[Any]) -> BaseException | None:
         code = error.exitcode
         end = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with {code}"
         return ChildProcessError(f"the worker process {end}")
+    if isinstance(error, TimeoutError):
+        return TimeoutError("still running at its time limit; its process was stopped, or stuck")
     return error
 
 

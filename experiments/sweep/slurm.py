@@ -5,7 +5,6 @@ Whether a job has ended is read from `squeue`, so that no accounting is needed.
 
 from __future__ import annotations
 
-import getpass
 import shutil
 import subprocess
 import time
@@ -19,6 +18,7 @@ from tqdm import tqdm
 from experiments.config.read import ConfigError
 from experiments.sweep.cluster import ClusterLauncher, Share, run_share
 
+_ANSWER = 60.0  # [s] that squeue may take
 _PATIENCE = 3  # looks at the queue in which a job must be absent before it counts as ended
 _SUBMISSION = {  # what submitit calls our own options
     "partition": "slurm_partition",
@@ -79,13 +79,17 @@ class SlurmLauncher(ClusterLauncher):
 
     def _wait(self, ids: Sequence[str]) -> None:
         """Until no job is in the queue any more; looks at no file, of which there may be many."""
-        absent = dict.fromkeys(ids, 0)
+        absent, silent = dict.fromkeys(ids, 0), False
         with tqdm(total=len(ids), unit="job", disable=None) as bar:
             while min(absent.values()) < _PATIENCE:
                 time.sleep(self.poll)
-                queue = _queue()
+                queue = _queue(ids)
                 if queue is None:
+                    if not silent:
+                        print("squeue does not answer; it is asked again", flush=True)
+                    silent = True
                     continue
+                silent = False
                 absent = {job_id: 0 if job_id in queue else n + 1 for job_id, n in absent.items()}
                 ended = sum(n >= _PATIENCE for n in absent.values())
                 if bar.disable and ended > bar.n:
@@ -94,8 +98,14 @@ class SlurmLauncher(ClusterLauncher):
                 bar.refresh()
 
 
-def _queue() -> set[str] | None:
-    """Ids of this user's jobs that wait or run; None if SLURM does not answer."""
-    command = ["squeue", "--noheader", "--array", "--format=%i", f"--user={getpass.getuser()}"]
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+def _queue(ids: Sequence[str]) -> set[str] | None:
+    """Those of some jobs that wait or run; None if SLURM does not answer."""
+    arrays = ",".join(sorted({job_id.partition("_")[0] for job_id in ids}))
+    command = ["squeue", "--noheader", "--array", "--format=%i", f"--jobs={arrays}"]
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=_ANSWER)
+    except subprocess.TimeoutExpired:
+        return None
+    if "Invalid job id" in answer.stderr:  # all have ended, and are forgotten
+        return set()
     return set(answer.stdout.split()) if answer.returncode == 0 else None

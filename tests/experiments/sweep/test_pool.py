@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hydra.core.utils import JobReturn, JobStatus
 
+from experiments.sweep import pool
 from experiments.sweep.pool import PoolLauncher
 
 TASKS = """
@@ -17,6 +18,8 @@ def task(config):
         raise ArithmeticError("the mass fell")
     if config.end == "kill":
         os.kill(os.getpid(), signal.SIGKILL)
+    if config.end == "stop":
+        os.kill(os.getpid(), signal.SIGSTOP)
     return config.end
 """
 
@@ -33,12 +36,13 @@ def task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def launch(task: Any, ends: list[str], *, workers: int, fail_fast: bool) -> list[JobReturn]:
-    pool = PoolLauncher(workers, fail_fast)
+    launcher = PoolLauncher(workers, fail_fast)
     jobs = [(f"end={end}",) for end in ends]
-    pool.task = task
-    pool.composed = {job: {"end": end} for job, end in zip(jobs, ends, strict=True)}
-    pool.names = {jobs[0]: "the first"}
-    return list(pool.launch(jobs, 0))
+    launcher.task = task
+    limits = {"sweep": {"time_limit": 1.0}}
+    launcher.composed = {job: {"end": end, **limits} for job, end in zip(jobs, ends, strict=True)}
+    launcher.names = {jobs[0]: "the first"}
+    return list(launcher.launch(jobs, 0))
 
 
 def test_each_job_returns_its_own_end(task: Any, capsys: pytest.CaptureFixture[str]) -> None:
@@ -61,3 +65,13 @@ def test_each_job_returns_its_own_end(task: Any, capsys: pytest.CaptureFixture[s
 def test_no_job_starts_after_a_failure_that_stops_the_sweep(task: Any) -> None:
     returns = launch(task, ["raise", "well"], workers=1, fail_fast=True)
     assert [each.status for each in returns] == [JobStatus.FAILED, JobStatus.UNKNOWN]
+
+
+def test_a_worker_that_was_stopped_is_killed_after_its_time_limit(
+    task: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It cannot end itself then, and its point would keep the sweep waiting for ever."""
+    monkeypatch.setattr(pool, "_GRACE", 2.0)
+    stopped, well = launch(task, ["stop", "well"], workers=1, fail_fast=False)
+    assert (stopped.status, well.status) == (JobStatus.FAILED, JobStatus.COMPLETED)
+    assert isinstance(stopped._return_value, TimeoutError)

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from sweeps import faulty, run_here
 
+from experiments.sweep import slurm
+
 SBATCH = """
 import os, re, subprocess, sys
 script = open(sys.argv[-1]).read()
@@ -133,3 +135,22 @@ def test_sweep_that_no_cluster_can_run_is_refused(
     assert message in err
     assert "Traceback" not in err
     assert not list(tmp_path.iterdir())
+
+
+ANSWERS = {
+    "import time\ntime.sleep(60)": None,
+    "import sys\nsys.exit(1)": None,
+    "import sys\nsys.exit('slurm_load_jobs error: Invalid job id specified')": set(),
+    "import sys\nassert '--jobs=7,8' in sys.argv, sys.argv\nprint('7_0\\n8_1')": {"7_0", "8_1"},
+}
+
+
+@pytest.mark.parametrize("code", ANSWERS)
+def test_jobs_are_asked_for_by_their_ids(
+    code: str, cluster: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever the environment says that the user is; and a queue that hangs is no answer."""
+    (tmp_path / "bin" / "squeue").write_text(f"#!{sys.executable}\n{code}\n")
+    monkeypatch.setenv("USER", "somebody_else")
+    monkeypatch.setattr(slurm, "_ANSWER", 1.0 if "sleep" in code else 60.0)
+    assert slurm._queue(["7_0", "7_1", "8_1"]) == ANSWERS[code]

@@ -201,15 +201,18 @@ def test_forced_point_runs_again(tmp_path: Path) -> None:
     assert tables(tmp_path, "points") == before
 
 
-def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(tmp_path: Path) -> None:
-    """By Ctrl-C; SIGTERM and SIGKILL are for the storms."""
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGHUP])
+def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(
+    stop: signal.Signals, tmp_path: Path
+) -> None:
+    """By Ctrl-C, or as its terminal goes; SIGTERM and SIGKILL are for the storms."""
     wrong = faulty(tmp_path)
     process = start(tmp_path, "-m", *wrong, "+system.fault=none,hang", "workers=2")
     assert running(process.pid)
     points = tmp_path / "results" / "points"
     while not list(points.glob("*/record.json")) and process.poll() is None:
         time.sleep(0.1)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does, workers included
+    os.killpg(process.pid, stop)  # as a terminal does, workers included
     _, err = process.communicate(timeout=20)
     assert process.returncode == 130
     assert "stopped; what has finished is kept" in err
