@@ -15,7 +15,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from experiments.lookback.archive import Archive, ArchiveError
-from experiments.tracking.files import PART
+from experiments.tracking.files import PART, read_file
 from experiments.tracking.locks import plan_lock
 from experiments.tracking.names import inner_path, is_identity, is_name
 
@@ -163,9 +163,21 @@ def _refuse_unknown(archive: Archive) -> None:
             f"{archive.results}, or run its sweep again"
             for folder in archive.without_listing
         ),
+        *_unreadable_records(archive),
     ]
     if reasons:
         raise ArchiveError("\n".join(["nothing is cleaned:", *reasons]))
+
+
+def _unreadable_records(archive: Archive) -> Iterator[str]:
+    """Records that are there and cannot be read."""
+    for facts in archive.points.values():
+        try:
+            read_file(facts.point.folder / "record.json")
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            yield f"{error.filename}: {error.strerror}"
 
 
 def _unused_entries(results: Path, records: list[dict[str, Any]]) -> Iterator[Leftover]:

@@ -21,8 +21,11 @@ from tiny_point import TINY, composed, computed, hopeless, planned
 
 from experiments import infer, results
 from experiments.collate.join import collate
+from experiments.config.paths import CHECKOUT
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
+from experiments.lookback.archive import Archive
+from experiments.lookback.cleaning import clean
 from experiments.tracking.figure_notes import figure_note, write_note
 from experiments.tracking.points import Point
 from experiments.tracking.sealed import read_sealed
@@ -499,3 +502,46 @@ def test_help_fits_the_terminal_and_its_examples_can_be_typed(
     assert len(examples) == 3
     for example in examples:
         assert parser.parse_args(shlex.split(example)).command
+
+
+@pytest.mark.parametrize("harm", ["renamed", "link", "file"])
+def test_clean_fails_closed(harm: str, settings: Settings, tmp_path: Path, look) -> None:
+    swept(settings, tmp_path, "s")
+    loose = finished(settings, tmp_path, seed=5)
+    if harm == "renamed":
+        (tmp_path / "s" / "study.json").rename(tmp_path / "s" / "study.json.bak")
+    elif harm == "link":
+        (tmp_path / "elsewhere" / "a").mkdir(parents=True)
+        (tmp_path / "points" / ("0" * 32)).symlink_to(tmp_path / "elsewhere")
+        (tmp_path / "elsewhere" / "study.json").touch()
+    else:
+        (tmp_path / "points" / "mine").write_text("a file")
+    before = everything(tmp_path)
+    status, out, err = look("clean", "--yes")
+    assert (status, out) == (2, "")
+    assert err.startswith("nothing is cleaned:")
+    assert everything(tmp_path) == before
+    assert loose.record()
+
+
+def test_clean_waits_while_a_sweep_lists_its_points(
+    settings: Settings, tmp_path: Path, look
+) -> None:
+    """What a plan has just come to name is kept, whatever was read before."""
+    point = finished(settings, tmp_path, seed=5)
+    archive = Archive(tmp_path)
+    assert archive.points
+    assert not archive.studies
+    write_plan(tmp_path / "s", [(point, ["seed=5"])])
+    assert list(clean(archive, remove=True)) == ["nothing to clean"]
+    assert point.record()
+
+
+def test_examples_name_points_that_exist() -> None:
+    assert CHECKOUT is not None
+    texts = [(CHECKOUT / "experiments" / "README.md").read_text(), str(results._EXAMPLES)]
+    names = {name for text in texts for name in re.findall(r"\b(?=\w*\d)[0-9a-f]{6}\b", text)}
+    points = json.loads((CHECKOUT / "results" / "paper" / "study.json").read_bytes())["points"]
+    assert names
+    for name in names:
+        assert len([point for point in points if point.startswith(name)]) == 1, name
