@@ -74,6 +74,11 @@ def _lines(error: ValidationError, kind: Any, tree: Mapping[str, Any]) -> Iterat
         elif each["type"] == "missing" and place[0] == "system" and "system" in tree:
             name = tree["system"]["_target_"].rpartition(".")[2]
             yield f"{key}: missing; {name} needs it"
+        elif each["type"] == "dataclass_type" and each["ctx"]["class_name"] == "Region":
+            yield (
+                f"{key}: {_short(each['input'])} is not a region; write its ends in each "
+                "dimension, such as {lower: [3.1, -0.1], upper: [3.2, 0.1]}"
+            )
         elif each["type"] in _WORDS:
             details = {**each.get("ctx", {}), "value": _short(each["input"])}
             yield f"{key}: " + _WORDS[each["type"]].format(**details)

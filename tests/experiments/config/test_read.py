@@ -238,7 +238,7 @@ VALUES = [
         "truth.boxes: c1 forbids every state; make its boxes smaller",
     ),
     ("truth.boxes=3", "truth.boxes: 3 is not a list"),
-    ("truth.boxes=[3]", "truth.boxes[0]: 3 is not a group of values"),
+    ("truth.boxes=[3]", "truth.boxes[0]: 3 is not a region; write its ends"),
     ("truth.boxes=[{lower:[0,1]}]", "truth.boxes[0].upper: missing; give it a value"),
     ("truth.name=3", "truth.name: 3 is not a word"),
     ("actions=[3.5]", "actions[0]: 3.5 is not a whole number"),
