@@ -13,6 +13,7 @@ from mlci.systems import System
 _TO_DEVIATION = 1.4826  # of a normal distribution, from the median of absolute values
 _REACH = 5  # samples on either side with which a sample is compared
 _UNUSUAL = 8.0  # standard deviations
+_SELDOM = 0.05  # of the samples: where more stand out, the path is not what it claims
 
 
 def noise(path: Floats, time: Floats) -> Floats:
@@ -64,7 +65,8 @@ def spikes(system: System, path: Floats, time: Floats) -> list[Spike]:
 
     A sample is compared with the median of the eleven around it, which a path that goes one way
     does not leave. It stands out if it is away by more than 8 standard deviations of the noise and
-    by more than the fastest motion of the window covers there.
+    by more than the fastest motion of the window covers there. Where more than a twentieth of the
+    samples do, none is a spike: such a path is no motion of the system.
 
     Args:
         system: the dynamics and the control box.
@@ -83,6 +85,8 @@ def spikes(system: System, path: Floats, time: Floats) -> list[Spike]:
     limit = np.maximum(_UNUSUAL * noise(path, time), fastest * np.median(np.diff(time)) * _REACH)
     excess = np.max(away / np.where(limit > 0, limit, np.inf), axis=1)
     out = np.flatnonzero(excess > 1)
+    if len(out) > _SELDOM * len(path):
+        return []
     runs = np.split(out, np.flatnonzero(np.diff(out) > 1) + 1) if len(out) else []
     found = []
     for run in runs:

@@ -52,6 +52,12 @@ def test_smooth_and_noisy_paths_have_no_spikes(noise_size: float) -> None:
     assert found == []
 
 
+def test_where_many_samples_stand_out_none_is_a_spike() -> None:
+    path = SMOOTH.copy()
+    path[10::12] += [2.0, 0.0]
+    assert spikes(SYSTEM, path, TIME) == []
+
+
 def test_a_path_that_jumps_and_stays_is_no_spike() -> None:
     path = SMOOTH.copy()
     path[150:] += [2.0, 0.0]
