@@ -11,6 +11,8 @@ import pandas as pd
 from experiments.lookback.archive import ArchiveError, Facts
 from experiments.tracking.files import csv_bytes, read_file
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how a cell begins that a spreadsheet computes
+
 
 def tidy_table(points: Sequence[Facts], measure: str) -> pd.DataFrame:
     """The rows of one measure of finished points, opened by each point's config and origin.
@@ -40,16 +42,21 @@ def tidy_table(points: Sequence[Facts], measure: str) -> pd.DataFrame:
 
 
 def file_bytes(table: pd.DataFrame, kind: str) -> bytes:
-    """A table as `csv` or `parquet`.
+    """A table as `csv`, in which no text is a formula of a spreadsheet, or `parquet`.
 
     Raises:
         ArchiveError: what writes parquet is not installed.
     """
     if kind == "csv":
-        return csv_bytes(table)
+        return csv_bytes(table.rename(columns=_no_formula).map(_no_formula))
     buffer = io.BytesIO()
     try:
         table.to_parquet(buffer, index=False)
     except ImportError:
         raise ArchiveError("parquet needs pyarrow: pip install 'mlci[parquet]'") from None
     return buffer.getvalue()
+
+
+def _no_formula(cell: object) -> object:
+    """A cell that a spreadsheet takes for text, with an apostrophe in front where it would not."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell
