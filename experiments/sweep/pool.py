@@ -67,17 +67,18 @@ class PoolLauncher(Launcher):
             initializer=_end_with_parent,
             initargs=[os.getpid()],
         )
-        resource_tracker.ensure_running()  # its start would unblock the signal
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
+        resource_tracker.ensure_running()  # its start would unblock SIGINT
         waiting, ended, failures = iter(jobs), 0, 0
         running: dict[Future[Any], Job] = {}
         try:
-            # Workers inherit the mask: Ctrl-C reaches this process only, which then stops them.
+            # Processes inherit the mask: signals reach this one only, which then stops them.
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 for job in islice(waiting, self.workers):
                     running[self._schedule(pool, job)] = job
             finally:
-                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGHUP})
             while running:
                 self._update(bar, failures, running.values())
                 for future in wait(running, _REFRESH, FIRST_COMPLETED).done:
