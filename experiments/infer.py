@@ -196,6 +196,7 @@ def _save(
     made_from = {
         "config": {**plain(settings), "demonstrations": "", "results": None, "top": 0},
         "paths": digest(csv_bytes(paths)),
+        "times": digest(b"".join(each.times.tobytes() for each in demonstrations)),
     }
     results = results_folder(settings) / "inference"
     folder = results / digest(canonical_json(made_from))[:16]

@@ -133,6 +133,17 @@ def test_durations_that_dt_does_not_divide(recorded: Path) -> None:
     assert line.endswith("more: its 5 s count as 17 steps of 0.3 s, 5.1 s")
 
 
+def test_the_same_states_at_other_times_are_another_result(recorded: Path) -> None:
+    words = f"demonstrations={recorded / 'recorded'}", "grid=100", "dt=0.5"
+    assert infer(recorded, *words).returncode == 0
+    first = saved(recorded)
+    for file in (recorded / "recorded").glob("*.csv"):
+        table = pd.read_csv(file)
+        table.assign(time=table["time"] * 1.2).to_csv(file, index=False)
+    assert infer(recorded, *words).returncode == 0
+    assert len(list(first.parent.iterdir())) == 2
+
+
 def test_times_in_milliseconds_are_refused_at_once(recorded: Path) -> None:
     for path in (recorded / "recorded").iterdir():
         table = pd.read_csv(path)
