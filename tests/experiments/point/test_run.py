@@ -123,7 +123,9 @@ def test_rows_are_opened_by_the_point_and_numbers_rounded(point: tuple, tmp_path
 
 
 def test_no_demonstration_is_told_with_the_outcomes(settings: Settings, tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match=r"no demonstration was kept: of 6 trials .* 6 missed the goal"):
+    with pytest.raises(
+        RuntimeError, match=r"no demonstration was kept: of 6 trials .* 6 missed the goal"
+    ):
         run_point(hopeless(settings), Store(tmp_path), lambda line: None)
 
 
