@@ -88,8 +88,8 @@ def _judgement(kinds: pd.DataFrame) -> str:
         if row["right"] > row["best"]:
             text += (
                 f" After {size} it is too modest ({number(row['best'])} probable, "
-                f"{number(row['right'])} right), for two reasons that lie in these worlds and that "
-                "a posterior which takes tasks as given cannot use: their starts and goals are "
+                f"{number(row['right'])} right), for at least two reasons that lie in these worlds "
+                "and that a posterior which takes tasks as given cannot use: starts and goals are "
                 "drawn where the truth allows them, so that each task alone tells a little of it; "
                 "and a demonstrator who goes round the truth crosses more of the other regions "
                 "than one who does not meet it, and so refutes them sooner."
