@@ -23,6 +23,7 @@ from paper_figures.report import (
     claim_4,
     claim_5,
     claim_6,
+    earlier,
     markdown,
     page,
     section_beliefs,
@@ -178,6 +179,24 @@ def test_a_part_and_a_claim_are_judged_by_their_settings() -> None:
         assert Claim("t", "p", found, "", "", "c").verdict is expected
     with pytest.raises(ValueError, match="no setting to check in: s"):
         Part("s", "r", [])
+
+
+def test_what_differs_from_the_first_report_is_told() -> None:
+    def claim(title: str, statement: str, holding: int, of: int) -> Claim:
+        checks = [Check(str(i), i < holding) for i in range(of)]
+        return Claim(title, "", [Part(statement, "", checks)], "", "", "")
+
+    same = claim("Final-state error", "little gain past 900 cells", 4, 10)
+    one = claim("Pairs that become demonstrations", "65 of 100 pairs are kept", 2, 2)
+    text = earlier.changes([one, Missing("paper", ""), same])
+    assert "claim 1, not reproduced to reproduced" in text
+    assert "65 of 100 pairs are kept (0 of 2 to 2 of 2)." in text
+    assert "Final-state" not in text
+    assert "little gain" not in text
+    partly = claim("Violation distance", "flat in dt", 4, 6)
+    assert earlier.changes([partly]).startswith("No verdict differs")
+    other = claim("Violation distance", "flat in dt", 5, 6)
+    assert "differ from version 0.1.0's: none." in earlier.changes([other])
 
 
 def test_a_share_has_wilsons_interval() -> None:
