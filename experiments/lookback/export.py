@@ -53,7 +53,7 @@ def file_bytes(table: pd.DataFrame, kind: str) -> bytes:
     try:
         table.to_parquet(buffer, index=False)
     except ImportError:
-        raise ArchiveError("parquet needs pyarrow: pip install 'mlci[parquet]'") from None
+        raise ArchiveError("parquet needs pyarrow: pip install pyarrow") from None
     return buffer.getvalue()
 
 

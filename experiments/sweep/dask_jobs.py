@@ -60,7 +60,7 @@ class DaskLauncher(ClusterLauncher):
 
     def _check_installed(self) -> None:
         if find_spec("distributed") is None:
-            raise ConfigError("hydra/launcher: dask needs pip install 'mlci[dask]'")
+            raise ConfigError("hydra/launcher: dask needs distributed: pip install distributed")
         if self.tls is not None and sorted(self.tls) != sorted(_TLS):
             raise ConfigError(f"hydra.launcher.tls: give it {', '.join(_TLS)}, each a file")
 

@@ -48,7 +48,7 @@ class SlurmLauncher(ClusterLauncher):
 
     def _check_installed(self) -> None:
         if find_spec("submitit") is None:
-            raise ConfigError("hydra/launcher: slurm needs pip install 'mlci[slurm]'")
+            raise ConfigError("hydra/launcher: slurm needs submitit: pip install submitit")
         if shutil.which("sbatch") is None:
             raise ConfigError("hydra/launcher: slurm needs sbatch, which is not on this machine")
 

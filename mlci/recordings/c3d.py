@@ -31,7 +31,7 @@ def read(file: Path, _wants: Wants, limit: int) -> Table:
         Unusable: ezc3d is not there, a damaged file, or one without markers.
     """
     if find_spec("ezc3d") is None:
-        raise Unusable("reading .c3d needs ezc3d: pip install 'mlci[mocap]'")
+        raise Unusable("reading .c3d needs ezc3d: pip install ezc3d")
     command = [sys.executable, "-P", str(c3d_process.__file__), str(file), str(limit)]
     try:
         done = subprocess.run(command, capture_output=True, timeout=_PATIENCE, check=False)

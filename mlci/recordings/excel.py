@@ -30,7 +30,7 @@ def read(file: Path, _wants: Wants, limit: int) -> Table:
     try:
         import openpyxl
     except ImportError:
-        raise Unusable("reading .xlsx needs openpyxl: pip install 'mlci[excel]'") from None
+        raise Unusable("reading .xlsx needs openpyxl: pip install openpyxl") from None
     with zipfile.ZipFile(file) as archive:
         size = _COST * sum(entry.file_size for entry in archive.infolist())
     if size > limit:

@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 PYTHON=$PWD/.venv/bin/python
 "$PYTHON" -c 'import distributed' 2> /dev/null || {
-    echo "dask.sh: NOT RUN: distributed is missing: pip install 'mlci[dask]'"
+    echo "dask.sh: NOT RUN: distributed is missing: pip install '.[dask]'"
     exit 0
 }
 

@@ -13,7 +13,7 @@ if ! command -v slurmctld munged > /dev/null; then
         --no-install-recommends slurm-wlm munge; } > /dev/null 2>&1 || skip "apt-get failed"
 fi
 [ "$(id -u)" = 0 ] || skip "the daemons need root"
-"$PYTHON" -c 'import submitit' 2> /dev/null || skip "submitit is missing: pip install 'mlci[slurm]'"
+"$PYTHON" -c 'import submitit' 2> /dev/null || skip "submitit is missing: pip install '.[slurm]'"
 
 work=$(mktemp -d)
 stop() {

@@ -53,7 +53,7 @@ def test_engine_without_its_extra_is_refused(
     words = ["-m", *TINY, f"results={tmp_path}", f"hydra/launcher={engine}"]
     done = run_here(run_command.main, *words, folder=tmp_path)
     assert done.returncode == 2
-    assert done.stderr == f"hydra/launcher: {engine} needs pip install 'mlci[{engine}]'\n"
+    assert done.stderr == f"hydra/launcher: {engine} needs {extra}: pip install {extra}\n"
     assert not list(tmp_path.iterdir())
 
 
