@@ -11,16 +11,24 @@ from experiments.config.paths import CONF, is_inside_checkout
 from experiments.config.problems import ConfigError
 
 PATHS = ("demonstrations", "results", "tasks")  # keys whose values are paths
+_NOT_TEXT = re.compile(r"[\ud800-\udfff]")  # bytes that are not UTF-8, as Python has them
 
 
 def command_words(words: Sequence[str]) -> list[str]:
     """A command line for Hydra, that finds the configs in `conf` of the current folder too.
 
     Raises:
-        ConfigError: one of them has the name of ours, which would be taken in its place; a
-            subject, whose file is composed last, would silently overrule another word; or another
-            sweeper than ours.
+        ConfigError: a word is not UTF-8; one of the configs there has the name of ours, which would
+            be taken in its place; a subject, whose file is composed last, would silently overrule
+            another word; or another sweeper than ours.
     """
+    for word in words:
+        if odd := _NOT_TEXT.search(word):
+            shown = word.encode("utf-8", "backslashreplace").decode("utf-8")
+            raise ConfigError(
+                f"{shown}: byte {ord(odd[0]) & 0xFF:#x} is not UTF-8, as a config must be; name "
+                f"the folder, or a pattern: {_NOT_TEXT.sub('?', word)}"
+            )
     # Hydra wants -m before, or after, all overrides.
     ordered = [
         quote_path(quote_options(w))

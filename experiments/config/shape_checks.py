@@ -50,8 +50,17 @@ def advice_shape_problems(settings: AdviceSettings) -> Iterator[str]:
 
 
 def recorded_shape_problems(settings: RecordedSettings) -> Iterator[str]:
-    """A start or goal that does not match the system."""
-    space = settings.model.space
+    """Recordings that are not named, and what does not match the system."""
+    space, given = settings.model.space, settings.demonstrations
+    if not given or not all([given] if isinstance(given, str) else given):
+        yield "demonstrations: empty; name a folder, a pattern or a file"
+    names = {"units": space.names, "columns": ("time", "states", *space.names)}
+    if settings.group_by:  # whose columns may have other names too
+        del names["columns"]
+    for key, known in names.items():
+        for name in getattr(settings, key) or {}:
+            if name not in known:
+                yield f"{key}: there is no {name}; there are {', '.join(known)}"
     if settings.start is not None:
         yield from _length_problems("start", settings.start, space)
     if settings.goal is not None:

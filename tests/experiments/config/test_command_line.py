@@ -7,7 +7,8 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.config.command_line import quote_path
+from experiments.config.command_line import command_words, quote_path
+from experiments.config.problems import ConfigError
 
 TEXTS = ["rec (1)", "naïve", "2024", "007", "1e3", "true", "a=b", "~/x", "rec[12].csv", "[x].csv"]
 TEXTS += [
@@ -59,3 +60,10 @@ def test_any_text_without_quotes_is_kept(path: str) -> None:
 )
 def test_other_words_stay_as_they_are(word: str) -> None:
     assert quote_path(word) == word
+
+
+def test_a_word_that_is_not_utf_8_is_refused_with_a_pattern() -> None:
+    with pytest.raises(
+        ConfigError, match=r"^demonstrations=a\\udcff.csv: byte 0xff is .*=a\?.csv$"
+    ):
+        command_words(["demonstrations=a\udcff.csv"])
