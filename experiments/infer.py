@@ -76,7 +76,8 @@ def infer(settings: RecordedSettings) -> int:
     for line in together(notes):
         complain(f"note: {line}")
     if not demonstrations:
-        print(f"no demonstration could be used: {len(problems)} lack what is named above")
+        lacking = f": {len(problems)} lack what is named above" if problems else ""
+        print(f"no demonstration could be used{lacking}")
         return FAILED
     results = writable_results(settings)
     checks = plausibilities(settings, demonstrations)

@@ -15,6 +15,11 @@ from mlci.recordings.recording import Remark
 from mlci.recordings.task_table import read_task_table
 from mlci.recordings.times import refuse_long
 
+_OVERSTATED = (
+    "shallow or short crossings of the recordings do not count, but those of the tabular model do: "
+    "the evidence is slightly overstated; inference.calibrate=true corrects that"
+)
+
 
 def read_recordings(settings: RecordedSettings) -> Readings:
     """The demonstrations that can be used, what is wrong with other files, and what was assumed.
@@ -56,6 +61,8 @@ def read_recordings(settings: RecordedSettings) -> Readings:
         if abs(duration / dt - steps) > ROUNDED_TIMES:
             message = f"its {duration:g} s count as {steps} steps of {dt:g} s, {steps * dt:g} s"
             readings.notes.append(Remark(name, message))
+    if usable and not (settings.inference.calibrate or settings.crossing.crossing().is_any):
+        readings.notes.append(Remark("crossing", _OVERSTATED))
     return readings._replace(demonstrations=usable)
 
 

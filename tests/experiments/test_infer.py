@@ -164,6 +164,10 @@ def test_times_in_milliseconds_are_refused_at_once(recorded: Path) -> None:
         (["demonstrations=nowhere", "dt=0"], "dt: 0.0 must be above 0"),
         (["demonstrations=nowhere", "start=[1]"], "start: [1.0] must have 2 entries"),
         (["demonstrations=nowhere", "grid=7"], "grid: there is no 7"),
+        (["demonstrations="], "demonstrations: empty; name a folder"),
+        (["demonstrations=[]"], "demonstrations: empty; name a folder"),
+        (["demonstrations=a", "units={angel: deg}"], "units: there is no angel; there are angle, "),
+        (["demonstrations=a", "columns={angel: x}"], "columns: there is no angel; there are time"),
     ],
 )
 def test_a_wrong_command_gets_one_clear_error(
@@ -227,6 +231,14 @@ def test_trials_of_one_file_with_copies_gaps_and_doubts(
     assert answer["crossing"] == {"depth": 0.0, "time": 0.05}
     assert [each["name"] for each in answer["recordings"]] == ["all_r0", "all_r1", "all_r3"]
     assert any("do not move as the dynamics allow: all_r3" in each for each in answer["warnings"])
+
+
+def test_crossings_that_do_not_count_overstate_what_is_not_calibrated(recorded: Path) -> None:
+    words = f"demonstrations={recorded / 'recorded'}", "grid=100", "dt=0.5"
+    done = infer(recorded, *words, "crossing.depth=0.05")
+    assert "note: crossing: shallow or short crossings of the recordings do not" in done.stderr
+    assert "slightly overstated" in (saved(recorded) / "page.html").read_text()
+    assert "overstated" not in infer(recorded, *words).stderr
 
 
 def test_a_table_of_tasks_that_is_none_is_a_wrong_config(recorded: Path) -> None:
