@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -113,6 +114,7 @@ VARIANTS: dict[str, Variant] = {
     "bars": Variant("txt", text(sep="|")),
     "spaces": Variant("txt", text(sep=" ")),
     "UTF-16": Variant("csv", text(encoding="utf-16")),
+    "UTF-16 without a mark": Variant("csv", text(encoding="utf-16-le")),
     "comments": Variant("csv", after("# subject 3\n\n% of 2026\n")),
     "names in a comment": Variant(
         "txt",
@@ -141,6 +143,77 @@ VARIANTS: dict[str, Variant] = {
         exact=1e-13,
     ),
     "units that are given": Variant("csv", text(in_degrees), {"units": DEGREES}, 1e-13),
+    "units that end names": Variant(
+        "csv",
+        text(
+            lambda t: renamed(
+                time="time_ms", angle="Angle / °", angular_velocity="angular_velocity_deg_s"
+            )(in_degrees(t).assign(time=t["time"] * 1000))
+        ),
+        exact=1e-13,
+    ),
+    "units that end other names": Variant(
+        "csv",
+        text(
+            lambda t: renamed(time="Time,s", angle="theta_deg", angular_velocity="omega_m")(
+                t.assign(angle=np.rad2deg(t["angle"]))
+            )
+        ),
+        {"columns": {"angle": "theta_deg", "angular_velocity": "omega_m"}},
+        exact=1e-13,
+    ),
+    "units in capitals": Variant(
+        "csv",
+        text(
+            lambda t: renamed(
+                time="TIME [S]", angle="ANGLE [DEG]", angular_velocity="angular velocity (DEG/S)"
+            )(in_degrees(t))
+        ),
+        exact=1e-13,
+    ),
+    "revolutions": Variant(
+        "csv",
+        text(
+            lambda t: renamed(angle="angle [rev]", angular_velocity="angular_velocity [rev/min]")(
+                t.assign(
+                    angle=t["angle"] / (2 * np.pi),
+                    angular_velocity=t["angular_velocity"] * 30 / np.pi,
+                )
+            )
+        ),
+        exact=1e-13,
+    ),
+    "powers in units": Variant(
+        "csv",
+        text(renamed(angle="angle [rad]", angular_velocity="angular_velocity (rad.s-1)")),
+    ),
+    "units below names": Variant(
+        "txt",
+        after(
+            "time\tangle\tangular_velocity\n(s)\t(deg)\t(deg/s)\n",
+            in_degrees,
+            sep="\t",
+            header=False,
+        ),
+        exact=1e-13,
+    ),
+    "lines above names": Variant("csv", after("Subject: 3\nRate,50\n\n")),
+    "delimiters after the last": Variant(
+        "csv",
+        after(
+            "time;angle;angular_velocity;;\n",
+            lambda t: t.assign(empty=""),
+            sep=";",
+            header=False,
+            lineterminator=";;\n",
+        ),
+    ),
+    "decimal commas in quotes": Variant(
+        "csv",
+        lambda t, p: p.write_text(
+            t.map(lambda x: repr(x).replace(".", ",")).to_csv(index=False, quoting=csv.QUOTE_ALL)
+        ),
+    ),
     "milliseconds": Variant(
         "csv", text(lambda t: t.assign(time=t["time"] * 1000)), {"time_unit": "ms"}
     ),
@@ -150,6 +223,19 @@ VARIANTS: dict[str, Variant] = {
     ),
     "timestamps": Variant(
         "csv", text(lambda t: t.assign(time=START + pd.to_timedelta(t["time"], unit="s")))
+    ),
+    "minutes and seconds": Variant(
+        "csv", text(lambda t: t.assign(time=[f"59:{s + 59.3:09.6f}" for s in t["time"]]))
+    ),
+    "times of day past midnight": Variant(
+        "csv",
+        text(
+            lambda t: t.assign(
+                time=(
+                    pd.Timestamp("2026-03-01 23:59:59.8") + pd.to_timedelta(t["time"], unit="s")
+                ).dt.strftime("%H:%M:%S.%f")
+            )
+        ),
     ),
     "durations": Variant(
         "csv", text(lambda t: t.assign(time=pd.to_timedelta(t["time"], unit="s")))
@@ -178,12 +264,47 @@ VARIANTS: dict[str, Variant] = {
         ).to_parquet(p),
         {"columns": {"states": "observation.state"}},
     ),
+    "parquet, structs in another order": Variant(
+        "parquet",
+        lambda t, p: pd.DataFrame(
+            {"time": t["time"], "states": t[STATES[::-1]].to_dict("records")}
+        ).to_parquet(p),
+    ),
+    "parquet, names of two levels": Variant(
+        "parquet",
+        lambda t, p: t.set_axis(
+            pd.MultiIndex.from_tuples([("time", ""), *(("hip", name) for name in STATES)]), axis=1
+        ).to_parquet(p),
+    ),
     "JSON, columns": Variant("json", lambda t, p: p.write_text(json.dumps(t.to_dict("list")))),
     "JSON, records": Variant("json", lambda t, p: p.write_text(json.dumps(t.to_dict("records")))),
     "JSON, lines": Variant(
         "json",
         lambda t, p: t.to_json(p, orient="records", lines=True, double_precision=15),
         exact=1e-14,
+    ),
+    "JSON, a line each": Variant(
+        "jsonl",
+        lambda t, p: t.to_json(p, orient="records", lines=True, double_precision=15),
+        exact=1e-14,
+    ),
+    "JSON, nested, in another order": Variant(
+        "json",
+        lambda t, p: p.write_text(
+            json.dumps(
+                {
+                    "about": {"id": 3},
+                    "data": {
+                        "time": t["time"].tolist(),
+                        "states": t[STATES[::-1]].to_dict("list"),
+                    },
+                }
+            )
+        ),
+    ),
+    "JSON, records in an object": Variant(
+        "json",
+        lambda t, p: p.write_text(json.dumps({"name": "x", "samples": t.to_dict("records")})),
     ),
     "JSON, array of states": Variant(
         "json",
@@ -201,6 +322,11 @@ VARIANTS: dict[str, Variant] = {
         lambda t, p: savemat(
             p, {"time": t["time"].to_numpy(), "states": t[STATES].to_numpy().T}, do_compression=True
         ),
+    ),
+    "MATLAB, structs": Variant(
+        "mat",
+        lambda t, p: savemat(p, {"run": {"t": t["time"].to_numpy(), "hip": t.to_dict("list")}}),
+        {"columns": {"time": "run.t"}},
     ),
     "Excel": Variant("xlsx", lambda t, p: t.to_excel(p, index=False), exact=1e-15),
     "Excel, timestamps below a gap": Variant(

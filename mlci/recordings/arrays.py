@@ -29,11 +29,13 @@ def table_of_arrays(file: Path, arrays: Mapping[str, Any], others: Sequence[str]
     """
     columns, fixed = {}, {}
     values = {name: np.asarray(array) for name, array in arrays.items()}
-    for name in [name for name in values if plain_name(name) in _FIXED]:
+    for name in list(values):
+        if (ours := plain_name(name.rpartition(".")[2])) not in _FIXED:
+            continue
         array = np.atleast_1d(values.pop(name).squeeze())
-        if plain_name(name) == "dt" and array.size != 1:
+        if ours == "dt" and array.size != 1:
             raise Unusable(f"needs one number 'dt' [s], not {array.shape}")
-        fixed[plain_name(name)] = array.item() if plain_name(name) == "dt" else array
+        fixed[ours] = array.item() if ours == "dt" else array
     values = {name: _upright(array) for name, array in values.items() if array.ndim}
     rows = _rows(values) if values else 0
     for name, array in values.items():

@@ -9,6 +9,7 @@ import numpy as np
 from mlci.spaces import Floats, StateSpace
 
 _ROUNDING = 1e-4  # of the bounds' width
+_MOST_TURNS = 1e6  # of a periodic dimension
 _IN_DEGREES = 180 / np.pi
 _FAR = 3.0  # times the bounds: what is beyond them by less is rather wide than in degrees
 
@@ -31,6 +32,13 @@ def clip_rounding(
         raise ValueError(
             f"{place(sample, space.names[d])}: {space.names[d]} = {states[sample, d]:g} is not a "
             "finite number"
+        )
+    turns = np.where(space.periodic, np.abs(states) / space.bounds.widths, 0.0)
+    if np.any(turns > _MOST_TURNS):
+        sample, d = (int(i) for i in np.argwhere(turns > _MOST_TURNS)[0])
+        raise ValueError(
+            f"{place(sample, space.names[d])}: {space.names[d]} = {states[sample, d]:g} is more "
+            f"than {_MOST_TURNS:g} turns away, which leaves no digits for where it is"
         )
     lower = np.where(space.periodic, -np.inf, space.bounds.lower)
     upper = np.where(space.periodic, np.inf, space.bounds.upper)

@@ -35,6 +35,7 @@ FORMATS = {
     ".npz": Format(npz.read),
     ".parquet": Format(parquet.read),
     ".json": Format(json_text.read, 40),
+    ".jsonl": Format(json_text.read, 40),
     ".mat": Format(matlab.read),
     ".xlsx": Format(excel.read),
     ".mot": Format(opensim.read_motion, 10),
@@ -44,27 +45,31 @@ FORMATS = {
 }
 
 
-def find_files(paths: Sequence[str | Path]) -> tuple[list[Path], list[Remark]]:
+def find_files(paths: Sequence[str | Path]) -> tuple[dict[Path, bool], list[Remark]]:
     """The files that paths stand for, each once; a problem for a path that stands for none.
+
+    With each file comes whether its own path was given, not a folder or pattern.
 
     In a folder those count whose format is known, without hidden ones; those of a folder or
     pattern come by name.
     """
-    found: dict[Path, None] = {}
+    found: dict[Path, bool] = {}
     problems = []
     for given in paths:
-        path = Path(given).expanduser()
+        path = Path(given)
         try:
+            path = path.expanduser()
             inside = _inside(path)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RuntimeError) as error:
             problems.append(Remark(shown_path(path), f"cannot be looked into ({error})"))
             continue
         if not inside:
             empty = f"holds no file of {', '.join(FORMATS)}"
             message = empty if path.is_dir() else "there is no such file"
             problems.append(Remark(shown_path(path), message))
-        found.update(dict.fromkeys(sorted(inside)))
-    return list(found), problems
+        for file in sorted(inside):
+            found[file] = found.get(file, False) or file == path
+    return found, problems
 
 
 def _inside(path: Path) -> list[Path]:

@@ -16,13 +16,15 @@ from mlci.recordings.columns import (
     TIMES,
     control_columns,
     header_unit,
+    plain_name,
     position,
     shortened,
+    trailing_unit,
 )
 from mlci.recordings.recording import Layout, Recording, goal_columns
-from mlci.recordings.table import Table
+from mlci.recordings.table import NoRecording, Table
 from mlci.recordings.times import seconds
-from mlci.recordings.units import converted, in_degrees
+from mlci.recordings.units import converted, fits, in_degrees
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import System
 
@@ -113,7 +115,8 @@ def _state(
     name, own = space.names[d], space.units[d]
     values = _column(table, place)
     try:
-        return converted(values, _unit(table, header, layout.units.get(name), own), own)
+        stated = layout.units.get(name) or _unit(table, header, name, own)
+        return converted(values, own if stated is None else stated, own)
     except ValueError as error:
         raise ValueError(
             f"column {header!r}: {error}; or say its unit, as in units={{{name}: {own or '1'}}}"
@@ -146,6 +149,8 @@ def _refuse_missing(
     if not missing:
         return
     names = [*map(str, table.columns.columns), *table.others]
+    if {"trial"} < {plain_name(n).partition("_")[0] for n in names} <= {"trial", "start", "goal"}:
+        raise NoRecording("is a table of starts and goals (tasks=FILE)")
     alike = difflib.get_close_matches(missing[-1], others, 1, _ALIKE)
     offered = alike if len(others) > 1 else others
     example = f"columns={{{missing[-1]}: {offered[0] if offered else 'NAME'}}}"
@@ -170,7 +175,7 @@ def _seconds(
     table: Table, header: str, place: int, layout: Layout, notes: list[str]
 ) -> tuple[Floats, float]:
     """The times of a table [s], and what they are exact to."""
-    unit = layout.time_unit or table.units.get(header) or header_unit(header)
+    unit = layout.time_unit or _unit(table, header, "", "s")
     if unit == SAMPLES:
         return _column(table, place) * _own_dt(table, layout), 0.0
     try:
@@ -182,12 +187,20 @@ def _seconds(
     return times, resolution
 
 
-def _unit(table: Table, header: str, given: str | None, own: str) -> str:
-    """The unit of a state in a file: what the user says, then the file, then the system's."""
-    stated = given or table.units.get(header) or header_unit(header)
-    if stated is None and table.fixed.get("in_degrees"):
-        return in_degrees(own)
-    return own if stated is None else stated
+def _unit(table: Table, header: str, name: str, own: str) -> str | None:
+    """The unit of a column as the file states it; None where it does not.
+
+    A last word of a header may also be part of a name, as in theta_m: it is a unit if the rest is
+    our name of the column, or if it measures what our unit does.
+    """
+    if stated := table.units.get(header) or header_unit(header):
+        return stated
+    bare, word = trailing_unit(header)
+    if word and plain_name(header) != plain_name(name):
+        last = bare.rpartition(".")[2]
+        if plain_name(name) in map(plain_name, (bare, last)) or fits(word, own):
+            return word
+    return in_degrees(own) if table.fixed.get("in_degrees") and name else None
 
 
 def _column(table: Table, place: int) -> Floats:

@@ -20,6 +20,7 @@ from mlci.recordings.files import MAX_MEMORY, find_files, read_table
 from mlci.recordings.named import to_recording
 from mlci.recordings.paths import Repair, demonstration_of
 from mlci.recordings.recording import Layout, Remark, shown_path
+from mlci.recordings.table import NoRecording
 from mlci.recordings.task_table import Ends, unmatched
 from mlci.recordings.trials import split_trials
 from mlci.spaces import Box
@@ -91,6 +92,12 @@ def read_demonstrations(
         try:
             recording = to_recording(read_table(file, wants, max_memory), system, layout)
             trials, split = split_trials(recording, group_by)
+        except NoRecording as error:
+            if files[file]:
+                problems.append(_remark(shown, error))
+            else:
+                notes.append(Remark(shown, f"{error}, and is passed over"))
+            continue
         except ValueError as error:
             problems.append(_remark(shown, error))
             continue

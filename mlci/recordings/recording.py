@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +11,9 @@ import pandas as pd
 
 from mlci.recordings.table import Table
 from mlci.spaces import Box, StateSpace
+
+# What would break a line, or lead a terminal astray.
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
 
 @dataclass(frozen=True)
@@ -83,5 +87,6 @@ def goal_columns(space: StateSpace) -> list[str]:
 
 
 def shown_path(path: Path) -> str:
-    """A path as text that any stream and file takes."""
-    return str(path).encode("utf-8", "backslashreplace").decode("utf-8")
+    """A path as text of one line that any stream and file takes."""
+    text = str(path).encode("utf-8", "backslashreplace").decode("utf-8")
+    return _CONTROL.sub(lambda odd: odd[0].encode("unicode_escape").decode(), text)

@@ -18,6 +18,10 @@ class Unusable(ValueError):
     """Why a file cannot be used, and what to do."""
 
 
+class NoRecording(Unusable):
+    """What a file is that nobody takes for a recording, such as a text or metadata."""
+
+
 @dataclass(frozen=True, eq=False)
 class Table:
     """The rows of a file, as they stand there.

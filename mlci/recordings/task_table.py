@@ -43,6 +43,8 @@ def read_task_table(file: str | Path, space: StateSpace) -> dict[str, Ends]:
         ValueError: a file that is no such table, or that names a trial twice.
         OSError: a file that cannot be read.
     """
+    if Path(file).exists() and not Path(file).is_file():
+        raise ValueError(f"{file}: is not a file")
     try:
         table = pd.read_csv(
             file, sep=None, engine="python", dtype={TRIAL: str}, encoding="utf-8-sig"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -17,6 +18,10 @@ MAX_DURATION = 1000.0  # [s], 200 times the paper's horizon
 # Seconds since 1970 of the years 2001 to 2096, and the same in smaller units.
 _UNIX = {unit: (1e9 * factor, 4e9 * factor) for unit, factor in
          {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}.items()}  # fmt: skip
+_CLOCK = re.compile(r"^(?:(\d{1,4}):)?(\d{1,4}):(\d{1,2}(?:[.,]\d*)?)$")
+_DAY = 86400.0  # [s]
+_NEARLY_A_DAY = 0.9 * _DAY
+_MOST_SECONDS = 1e15  # beyond, digits of a second are lost
 _EXACT = 1e-9  # [s]: finer resolutions need no rounding
 
 
@@ -44,7 +49,9 @@ def seconds(
         numbers = pd.to_numeric(column, errors="coerce")
         bad = numbers.isna() & column.notna()
         if bad.any():
-            moments = _moments(column)
+            if (clock := _clock(column)) is not None:
+                return clock
+            moments = None if numbers.notna().any() else _moments(column)
             if moments is None:
                 row = int(np.argmax(bad))
                 raise ValueError(
@@ -104,8 +111,9 @@ def refuse_long(duration: float, dt: float, longest: float = MAX_DURATION) -> No
 def _of_numbers(column: pd.Series[Any], unit: str | None) -> tuple[Floats, float, str]:
     """Numbers as seconds."""
     values: Any = column.to_numpy()
+    rounding = float(np.finfo(values.dtype).eps) if values.dtype.kind == "f" else 0.0
     note = ""
-    if values.dtype.kind not in "iuf":
+    if values.dtype.kind not in "iu":
         values = values.astype(float)
     known = values[np.isfinite(values.astype(float))]
     if not len(known):
@@ -117,9 +125,10 @@ def _of_numbers(column: pd.Series[Any], unit: str | None) -> tuple[Floats, float
         unit = looks[0] if looks else "s"
         if unit != "s":
             note = f"time is taken for Unix time in {unit}, by its size"
-    rounding = float(np.finfo(values.dtype).eps) if values.dtype.kind == "f" else 0.0
     error = float(rounding * np.max(np.abs(known.astype(float))))
     times = converted(values.astype(float), unit, "s")
+    if (farthest := float(np.max(np.abs(times[np.isfinite(times)])))) > _MOST_SECONDS:
+        raise ValueError(f"holds a time of {farthest:g} s: is its unit {unit}? say so by time_unit")
     scale = float(converted(np.array([1.0]), unit, "s")[0])
     return times, max(error * scale, _printed(times)), note
 
@@ -133,9 +142,31 @@ def _printed(times: Floats) -> float:
     return 0.0
 
 
+def _clock(column: pd.Series[Any]) -> tuple[Floats, float, str] | None:
+    """Text of hours, minutes and seconds, or of the last two, as `seconds`; None if it is other.
+
+    From one midnight to the next hours begin anew.
+    """
+    parts = column.astype("string").str.strip().str.extract(_CLOCK)
+    if not parts[2].notna().equals(column.notna()) or parts[2].isna().all():
+        return None
+    seconds_ = parts[2].str.replace(",", ".").astype(float)
+    hours, minutes = parts[0].astype(float), parts[1].astype(float)
+    has_hours = hours.notna().any()
+    time = np.array(3600 * hours.fillna(0.0) + 60 * minutes + seconds_, dtype=float)
+    known = np.flatnonzero(np.isfinite(time))
+    if has_hours:
+        days = np.cumsum(np.diff(time[known]) < -_NEARLY_A_DAY)
+        time[known[1:]] += _DAY * days
+    note = "" if has_hours else "time is taken for minutes and seconds"
+    return time - time[known[0]], _EXACT, note
+
+
 def _moments(column: pd.Series[Any]) -> pd.Series[Any] | None:
     """Text as timestamps or durations; None where some is neither."""
     text = column.astype("string").str.strip()
+    if text.str.fullmatch(r"[\d.,+ -]*").any():
+        return None  # numbers, with whatever between thousands
     readers: tuple[Callable[[], Any], ...] = (
         lambda: pd.to_datetime(text, format="ISO8601", utc=True),
         lambda: pd.to_timedelta(text),

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from mlci.recordings.columns import shortened
+from mlci.recordings.columns import TRIALS, plain_name, shortened
 from mlci.recordings.recording import Recording
 from mlci.spaces import Floats, Ints
 
@@ -36,7 +36,8 @@ def split_trials(recording: Recording, group_by: Sequence[str]) -> tuple[list[Tr
     Args:
         recording: the file, whose frame has the columns of `group_by`.
         group_by: columns whose values name a trial together; with none, time that starts again
-            starts another trial. It does so within a trial of `group_by` as well.
+            starts another trial, or columns such as `trial` name them. Time that starts again does
+            so within a trial of `group_by` as well.
 
     Raises:
         ValueError: time that goes forth and back, as where several trials interleave.
@@ -46,23 +47,23 @@ def split_trials(recording: Recording, group_by: Sequence[str]) -> tuple[list[Tr
         others = shortened([*map(str, recording.table.columns.columns), *recording.table.others])
         raise ValueError(f"has no column {' or '.join(missing)} for group_by, but {others}")
     groups = [("", frame)]
-    if group_by:
-        keys = _texts(frame, group_by)
+    keys, named = _keys(recording, group_by)
+    if keys is not None:
         unnamed = keys == ""
         if unnamed.any():
-            notes.append(f"{int(unnamed.sum())} rows without {' or '.join(group_by)} are left out")
+            notes.append(f"{int(unnamed.sum())} rows without {' or '.join(named)} are left out")
         names = pd.unique(keys[~unnamed])
         groups = [(name, frame[(keys == name).to_numpy()]) for name in names]
         if not groups:
-            raise ValueError(f"has no row with a value of {' and '.join(group_by)}")
+            raise ValueError(f"has no row with a value of {' and '.join(named)}")
     trials = []
     for name, rows in groups:
-        parts = _parts(rows, fewest=2 if group_by else 3)
+        parts = _parts(rows, fewest=2 if named else 3)
         if len(parts) == 1:
             trials.append(Trial(name, rows))
             continue
-        column = None if group_by else _naming_column(recording, parts)
-        if not parts or not (group_by or column or not _id_columns(recording)):
+        column = None if named else _naming_column(recording, parts)
+        if not parts or not (named or column or not _id_columns(recording)):
             raise ValueError(_interleaved(recording, rows, is_grouped=bool(group_by)))
         labels = [str(number + 1) for number in range(len(parts))]
         if column is not None:
@@ -74,9 +75,26 @@ def split_trials(recording: Recording, group_by: Sequence[str]) -> tuple[list[Tr
         places = _shown([recording.place(part.index[0], "time") for part in parts[1:]])
         by = "" if column is None else f", named by column {column!r}"
         notes.append(f"time starts again at {places}: {len(parts)} trials{by}")
-    if group_by and len(trials) > 1:
-        notes.append(f"{len(trials)} trials by {' and '.join(group_by)}")
+    if named and len(trials) > 1:
+        notes.append(f"{len(trials)} trials by {' and '.join(named)}")
     return trials, notes
+
+
+def _keys(
+    recording: Recording, group_by: Sequence[str]
+) -> tuple[pd.Series[str] | None, Sequence[str]]:
+    """What names the trial of each row, and the columns that this is made of.
+
+    Where time never starts again and none are given, they are those whose names say so.
+    """
+    if group_by:
+        return _texts(recording.frame, group_by), group_by
+    if len(_parts(recording.frame, fewest=3)) == 1:
+        known = {plain_name(name) for name in TRIALS}
+        named = [name for name in _id_columns(recording) if plain_name(name) in known]
+        if named:
+            return _texts(recording.table.columns, named), named
+    return None, ()
 
 
 def _parts(rows: pd.DataFrame, fewest: int) -> list[pd.DataFrame]:
@@ -91,11 +109,19 @@ def _parts(rows: pd.DataFrame, fewest: int) -> list[pd.DataFrame]:
 def _interleaved(recording: Recording, rows: pd.DataFrame, *, is_grouped: bool) -> str:
     """What is wrong with time that goes forth and back, and which column may help."""
     time = rows["time"].dropna()
-    place = recording.place(time.index[1:][(np.diff(time) <= 0)][0], "time")
+    steps = np.diff(time)
+    place = recording.place(time.index[1:][(steps <= 0)][0], "time")
+    if np.all(steps <= 0) and np.any(steps < 0):
+        return f"{place}: time runs backwards in the whole file: sort its samples by time"
     hint = "group_by=COLUMN tells trials apart, by a column that names them"
     if not is_grouped and (columns := _id_columns(recording)):
         count = recording.table.columns[columns[0]].nunique()
         hint = f"group_by={columns[0]} would tell {count} trials apart"
+    elif np.all(steps >= 0):
+        return (
+            f"{place}: time stands still in {int(np.sum(steps == 0))} of {len(steps)} steps, as "
+            "where it was rounded: write it with more digits, or leave repeated samples out"
+        )
     return f"{place}: time goes forth and back, as where several trials interleave: {hint}"
 
 

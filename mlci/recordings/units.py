@@ -17,6 +17,12 @@ _FORM = re.compile(
     r"(1 ?/ ?)?[^\W\d]+([\^*]{0,2}[+-]?\d)?([ */]+[^\W\d]+([\^*]{0,2}[+-]?\d)?){0,5}"
 )
 _SYMBOLS = {"°": "deg", "µ": "u", "μ": "u", "·": "*", "²": "^2", "³": "^3", "⁻¹": "^-1"}
+# Other spellings: s-1 for s^-1, rad.s^-1 for rad*s^-1, rev for revolution.
+_SPELLINGS = (
+    (re.compile(r"(?<=[^\W\d])-(?=\d)"), "^-"),
+    (re.compile(r"(?<=[^\W\d])\.(?=[^\W\d])"), "*"),
+    (re.compile(r"\brevs?\b", re.IGNORECASE), "revolution"),
+)
 _RADIANS = re.compile(r"\brad(ians?)?\b")
 
 
@@ -33,12 +39,17 @@ def converted(values: Floats, unit: str, own: str) -> Floats:
     """
     if _plain(unit) == _plain(own):
         return values
-    theirs, ours, registry = _parsed(unit), _parsed(own), _registry()
-    # Root units and not dimensions, of which an angle has none.
-    if registry.get_root_units(theirs)[1] != registry.get_root_units(ours)[1]:
-        raise ValueError(f"the unit {unit!r} is none of what is measured in {own or 'numbers'!r}")
-    result: Floats = registry.Quantity(values, theirs).to(ours).magnitude
+    theirs, ours = _fitting(unit, own), _parsed(own)
+    result: Floats = _registry().Quantity(values, theirs).to(ours).magnitude
     return result
+
+
+def fits(unit: str, own: str) -> bool:
+    """Whether a unit measures what another does."""
+    try:
+        return _plain(unit) == _plain(own) or _fitting(unit, own) is not None
+    except ValueError:
+        return False
 
 
 def in_degrees(own: str) -> str:
@@ -46,10 +57,31 @@ def in_degrees(own: str) -> str:
     return _RADIANS.sub("deg", own)
 
 
+def _fitting(unit: str, own: str) -> Any:
+    """A unit of pint that measures what `own` does, whatever its case: [DEG], [S]."""
+    registry, ours = _registry(), _parsed(own)
+    errors = list[ValueError]()
+    for text in dict.fromkeys((unit, unit.casefold())):
+        try:
+            theirs = _parsed(text)
+        except ValueError as error:
+            errors.append(error)
+            continue
+        # Root units and not dimensions, of which an angle has none.
+        if registry.get_root_units(theirs)[1] == registry.get_root_units(ours)[1]:
+            return theirs
+        errors.append(
+            ValueError(f"the unit {unit!r} is none of what is measured in {own or 'numbers'!r}")
+        )
+    raise errors[0]
+
+
 def _plain(unit: str) -> str:
     """A unit's text, with symbols spelt out."""
     for symbol, word in _SYMBOLS.items():
         unit = unit.replace(symbol, word)
+    for spelling, usual in _SPELLINGS:
+        unit = spelling.sub(usual, unit)
     return " ".join(unit.split())
 
 

@@ -160,7 +160,7 @@ def test_parquet_without_its_package_says_what_to_install(tmp_path, monkeypatch)
         return real(name, *args, **options)
 
     monkeypatch.setattr(builtins, "__import__", without_pyarrow)
-    assert "pip install 'mlci[parquet]'" in problem_with(tmp_path / "a.parquet", "")
+    assert "pip install pyarrow" in problem_with(tmp_path / "a.parquet", "")
 
 
 def test_jumps_at_the_seam_are_undone(tmp_path, swing):

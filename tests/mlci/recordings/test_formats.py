@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from pathlib import Path
 
@@ -9,8 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from recorded_variants import VARIANTS, write_c3d, write_trc
+from scipy.io import savemat
 
 from mlci.recordings.files import FORMATS
+from mlci.recordings.paths import Repair
 from mlci.recordings.read import Readings, read_demonstrations
 from mlci.spaces import Box, StateSpace
 from mlci.systems import FunctionSystem, Pendulum
@@ -206,6 +209,109 @@ def test_damaged_compression_and_what_is_no_file_are_named(tmp_path: Path) -> No
     assert len(read(tmp_path / "folder.csv").demonstrations) == 1
 
 
+@pytest.mark.parametrize("word", ["NA", "-", "", " ", "--", ".", "?", "NAN", "#DIV/0!", "-1.#IND"])
+def test_what_people_write_for_no_number_is_a_gap(tmp_path: Path, word: str) -> None:
+    (tmp_path / "a.csv").write_text(HEADER + f"0,1,0\n0.1,{word},0\n0.2,1.002,0\n")
+    repair = Repair(np.array([0.1, 0.1]))
+    (demonstration,), _, (note,) = read(tmp_path / "a.csv", repair=repair)
+    assert note.message == "1 missing values of angle are bridged (line 3 first)"
+    assert demonstration.states[1, 0] == pytest.approx(1.001)
+
+
+def test_thousands_between_quotes_are_no_decimals(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(HEADER + '"999",1,0\n"1,000",1,0\n"1,001",1,0\n')
+    assert "time '1,000' is neither a number nor" in message(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text(HEADER + '"1,000",1,0\n"1,001",1,0\n')
+    assert "time '1,000' is neither a number nor" in message(tmp_path / "a.csv")
+
+
+def test_a_first_column_without_a_name_may_be_time(tmp_path: Path, table: pd.DataFrame) -> None:
+    states = table[["angle", "angular_velocity"]]
+    states.set_index(table["time"] * 3).rename_axis(None).to_csv(tmp_path / "a.csv")
+    assert "no column time in its header (column 1, angle" in message(tmp_path / "a.csv")
+    (demonstration,), *_ = read(tmp_path / "a.csv", columns={"time": "column 1"})
+    np.testing.assert_allclose(demonstration.times, table["time"] * 3)
+    states.to_csv(tmp_path / "a.csv")  # numbers of lines
+    (demonstration,), *_ = read(tmp_path / "a.csv")
+    np.testing.assert_allclose(demonstration.times, table["time"], atol=1e-12)
+
+
+def test_of_two_joints_neither_is_taken(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(
+        "time,hip.angle,knee.angle,angular_velocity\n0,1,2,0\n1,1,2,0\n"
+    )
+    words = "has 2 columns 'angle' (hip.angle, knee.angle): name the one to use, as in columns={ang"
+    assert words in message(tmp_path / "a.csv")
+    (demonstration,), *_ = read(tmp_path / "a.csv", columns={"angle": "knee.angle"})
+    assert demonstration.states[0, 0] == 2
+
+
+def test_an_angle_without_digits_for_where_it_is_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(HEADER + "0,1e16,0\n1,1e16,0\n")
+    assert "line 2: angle = 1e+16 is more than 1e+06 turns away" in message(tmp_path / "a.csv")
+
+
+def test_texts_and_metadata_are_passed_over_in_a_folder(tmp_path: Path) -> None:
+    beside = {
+        "README.txt": "Recorded in 2026,\nby three people.\n1. The first\n",
+        "metadata.json": '{"subject": "S1", "rate": 100, "bounds": [-1, 1]}',
+        "people.json": '[{"name": "S1", "age": 30}]',
+        "tasks.csv": "trial,start_angle,start_angular_velocity\na,1,0\n",
+    }
+    for name, text in beside.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "a.csv").write_text(HEADER + "0,1,0\n1,1,0\n")
+    readings = read(tmp_path)
+    assert (len(readings.demonstrations), readings.problems) == (1, [])
+    assert [note.message for note in readings.notes] == [
+        "is text without samples, and is passed over",
+        "is JSON without samples, and is passed over",
+        "is JSON without samples, and is passed over",
+        "is a table of starts and goals (tasks=FILE), and is passed over",
+    ]
+    for name in beside:  # but not where it is asked for
+        assert message(tmp_path / name).startswith("is ")
+
+
+def test_a_recording_that_is_empty_or_in_other_words_is_not_passed_over(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text(HEADER)
+    (tmp_path / "b.txt").write_text("when,theta,omega\n0,1,0\n1,1,0\n")
+    (tmp_path / "c.json").write_text(str({"theta": [1.0] * 20}).replace("'", '"'))
+    (tmp_path / "d.csv").write_text("by three people\n")
+    assert len(read(tmp_path).problems) == 4
+
+
+def test_trials_in_json_are_told_apart(tmp_path: Path, table: pd.DataFrame) -> None:
+    trial = table.to_dict("list")
+    trials = [{**trial, "angle": [float(k)] * 26, "name": f"S{k}"} for k in (1, 2)]
+    (tmp_path / "a.json").write_text(json.dumps({"trials": trials}))
+    found, problems, _ = read(tmp_path / "a.json")
+    assert problems == []
+    assert [each.name for each in found] == ["a_1", "a_2"]
+    assert [each.states[0, 0] for each in found] == [1.0, 2.0]
+
+
+def test_arrays_of_structs_are_named(tmp_path: Path) -> None:
+    trials = np.array([(1.0,), (2.0,)], dtype=[("time", "O")])
+    savemat(tmp_path / "a.mat", {"trials": trials})
+    assert "variable 'trials' is a struct (1, 2): save a file" in message(tmp_path / "a.mat")
+
+
+def test_half_precision_and_times_beyond_all_bounds(tmp_path: Path, table: pd.DataFrame) -> None:
+    with np.errstate(over="raise"):
+        np.savez(tmp_path / "a.npz", **{n: table[n].to_numpy(dtype="f2") for n in table})
+        (demonstration,), *_ = read(tmp_path / "a.npz")
+        np.testing.assert_allclose(demonstration.times, table["time"], atol=1e-3)
+        (tmp_path / "a.csv").write_text(HEADER + "-1.7e308,1,0\n1.7e308,1,0\n")
+        assert "holds a time of 1.7e+308 s: is its unit s?" in message(tmp_path / "a.csv")
+
+
+def test_a_struct_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
+    savemat(tmp_path / "a.mat", {"run": {"time": np.zeros(10**6)}}, do_compression=True)
+    assert (tmp_path / "a.mat").stat().st_size < 2e4
+    assert "unpacks to more than half of max_memory" in message(tmp_path / "a.mat", max_memory=10)
+
+
 def test_hidden_files_are_passed_over(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(HEADER + "0,1,0\n1,1,0\n")
     (tmp_path / "._a.csv").write_bytes(b"\x00\x05\x16\x07")
@@ -214,10 +320,15 @@ def test_hidden_files_are_passed_over(tmp_path: Path) -> None:
 
 
 def test_a_name_that_is_no_text_is_shown(tmp_path: Path) -> None:
-    path = tmp_path / "d\udcff.csv"
+    path = tmp_path / "d\udcff\n\x1b[31m.csv"
     path.write_text(HEADER + "0,1,0\n1,1,0\n")
     (demonstration,), *_ = read(tmp_path)
-    assert demonstration.name == "d\\udcff"
+    assert demonstration.name == "d\\udcff\\n\\x1b[31m"
+
+
+def test_a_home_that_nobody_has_is_named() -> None:
+    _, (problem,), _ = read(Path("~nobody-of-this-name/a.csv"))
+    assert problem.message.startswith("cannot be looked into (")
 
 
 def test_nanoseconds_since_1970_lose_no_digit(tmp_path: Path) -> None:

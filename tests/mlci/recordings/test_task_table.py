@@ -1,5 +1,6 @@
 """Starts and goals from a table."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -56,3 +57,9 @@ def test_what_is_no_table_of_tasks_is_refused(tmp_path: Path, text: str, message
     file.write_text(text)
     with pytest.raises(ValueError, match=message):
         read_task_table(file, SPACE)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(ValueError, match=r"pipe.csv: is not a file"):
+        read_task_table(tmp_path / "pipe.csv", SPACE)

@@ -93,3 +93,22 @@ def test_trials_that_interleave_are_refused_with_the_column_that_names_them() ->
 
 def test_a_small_step_back_is_left_to_who_needs_rising_times() -> None:
     assert sizes(recording(rows([0.0, 0.1, 0.2, 0.19, 0.3, 0.4]))) == {"": 6}
+
+
+def test_a_column_that_says_so_names_trials_although_time_goes_on() -> None:
+    time = (np.arange(9) / 10).tolist()
+    beside = {"phase": [1, 1, 1, 2, 3, 3, 3, 3, 3]}
+    found = recording(rows(time, trial=[1.0] * 3 + [2.0] * 3 + [3.0] * 3, **beside))
+    assert sizes(found) == {"1": 3, "2": 3, "3": 3}
+    assert split_trials(found, ())[1] == ["3 trials by trial"]
+    found = recording(rows(time, subject_trial=[1] * 4 + [2] * 5))
+    assert sizes(found) == {"": 9}
+    interleaved = recording(rows(time, track_id=[1, 2, 3] * 3))
+    assert sizes(interleaved) == {"1": 3, "2": 3, "3": 3}
+
+
+def test_time_that_runs_backwards_or_stands_still_is_named_as_that() -> None:
+    with pytest.raises(ValueError, match="line 3: time runs backwards in the whole file: sort"):
+        split_trials(recording(rows([0.3, 0.2, 0.1, 0.0])), ())
+    with pytest.raises(ValueError, match="line 3: time stands still in 3 of 5 steps"):
+        split_trials(recording(rows([0, 0, 1, 1, 2, 2])), ())
