@@ -6,6 +6,7 @@ What a command does is imported late, so that Ctrl-C ends it quietly from the st
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import re
@@ -86,14 +87,16 @@ def run_command(
         """The work, outside Hydra's own handling of errors."""
         try:
             status = act(plain_tree(config))
+            sys.stdout.flush()
         except ConfigError as error:
             complain(str(error))
             raise SystemExit(REFUSED) from None
         except failures as error:
             complain(str(error))
             raise SystemExit(FAILED) from None
-        except Exception:
-            traceback.print_exc()
+        except Exception as error:
+            if not _cannot_print(error):
+                traceback.print_exc()
             raise SystemExit(FAILED) from None
         if status != DONE:
             raise SystemExit(status)
@@ -168,6 +171,18 @@ def _help(name: str) -> str:
 
     text = (CONF / "help" / name).read_text(encoding="utf-8")
     return text if CHECKOUT else re.sub(r"python experiments/(\w+)\.py", r"mlci-\1", text)
+
+
+def _cannot_print(error: Exception) -> bool:
+    """Whether nobody reads what is printed any more, or there is no room; the latter is told."""
+    if not (isinstance(error, OSError) and error.errno in (errno.EPIPE, errno.ENOSPC)):
+        return False
+    if error.errno == errno.ENOSPC:
+        print(f"{error}; what has finished is kept", file=sys.stderr)
+    # What is left to print has nowhere to go.
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+    return True
 
 
 def _leave(*_: Any) -> None:

@@ -41,7 +41,7 @@ from mlci.diagnosis import diagnose
 from mlci.inference import Inference
 from mlci.recordings.plausibility import Plausibility, summary
 from mlci.recordings.read import Readings
-from mlci.recordings.recording import Remark
+from mlci.recordings.recording import Remark, shown_path
 from mlci.tabular import TabularModel, discretize
 from mlci.temperature import estimate_temperature
 from paper_figures import hypothesis_map
@@ -143,8 +143,8 @@ def infer(settings: RecordedSettings) -> int:
     content = _page(settings, readings, result, calibration, doubtful, concerns)
     replace_file(folder / "page.html", content)
     begin("")
-    print(f"written: {folder}")
-    print(f"page: {folder / 'page.html'}")
+    print(f"written: {shown_path(folder)}")
+    print(f"page: {shown_path(folder / 'page.html')}")
     return FAILED if problems else DONE
 
 

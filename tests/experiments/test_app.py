@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from sweeps import gone
 
+from experiments.app import FAILED, run_command
 from experiments.config.paths import CHECKOUT
 
 # A command, and a word in the name of the first module that takes time.
@@ -49,3 +50,23 @@ def test_ctrl_c_while_modules_are_imported_ends_a_command_quietly(
     assert (process.returncode, out, told) == (130, "", [])
     assert gone(process.pid)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_reader_that_has_gone_and_a_full_disk_leave_no_traceback(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As with `| head -1`."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    monkeypatch.setattr(sys, "argv", ["infer.py", "demonstrations=a"])
+    full = os.open("/dev/full", os.O_WRONLY)
+    for where, told in ((writer, ""), (full, "No space left")):
+        with os.fdopen(where, "w") as stream, monkeypatch.context() as patch:
+            patch.setattr(sys, "stdout", stream)
+            with pytest.raises(SystemExit) as end:
+                run_command("infer", lambda _: print("an answer") or 0)
+        err = capsys.readouterr().err
+        assert end.value.code == FAILED
+        assert "Traceback" not in err
+        assert told in err
+        assert len(err.splitlines()) == len(told[:1])
