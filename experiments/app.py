@@ -123,8 +123,6 @@ def run_command(
 def _start(module: str, help_file: str | None = None) -> int:
     """Import a module, which takes a second, and run its `main`; returns the exit status.
 
-    Modules of the current folder can be imported by name, such as those of a user's own system.
-
     Args:
         module: of the command.
         help_file: in conf/help, what it says to --help; None if `main` answers that.
@@ -135,10 +133,11 @@ def _start(module: str, help_file: str | None = None) -> int:
     if help_file is not None and {"--help", "-h"}.intersection(sys.argv[1:]):
         print(_help(help_file), end="")
         return DONE
-    # After all others, so that it hides none of them; workers get the same. Python itself adds the
-    # folder of the file that it was given, where a module of ours could be taken for a user's.
+    # Python itself adds the folder of the file that it was given, where a module of ours could be
+    # taken for a user's. The current folder stays out until a config names a module in it.
     ours = os.path.dirname(os.path.abspath(__file__))
-    sys.path[:] = [path for path in sys.path if os.path.abspath(path) != ours] + [os.getcwd()]
+    sys.path[:] = [path for path in sys.path if os.path.abspath(path) != ours]
+    os.environ["PYTHONSAFEPATH"] = "1"  # nor do worker processes look there as they start
     usual = signal.getsignal(signal.SIGINT)
     if usual is not signal.SIG_IGN:  # which it is in the background of a script
         signal.signal(signal.SIGINT, _leave)

@@ -13,6 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from experiments.config.settings import SystemSettings, system_class
 from experiments.config.settings.kinds import LIST, ONE, WORD
 from experiments.config.suggestions import did_you_mean
+from experiments.tracking.own_modules import put_on_path
 
 T = typing.TypeVar("T")
 
@@ -41,11 +42,15 @@ _WORDS = {
 
 
 def checked(kind: type[T], tree: Mapping[str, Any]) -> T:
-    """A tree of plain values as settings.
+    """A tree of plain values as settings; its system may be of the current folder's modules.
 
     Raises:
         ConfigError: with a line for each value that does not fit.
     """
+    system = tree.get("system")
+    target = system.get("_target_") if isinstance(system, Mapping) else None
+    if isinstance(target, str):
+        put_on_path(target)
     try:
         return TypeAdapter(kind).validate_python(_without_missing(tree))
     except ValidationError as error:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from experiments.lookback.archive import Facts, count_states
 from experiments.tracking import figure_notes
+from experiments.tracking.own_modules import on_path
 from experiments.tracking.points import State, point_source
 from experiments.tracking.study import Study, table_source
 from experiments.tracking.study_tables import table_changes
@@ -32,9 +33,15 @@ def shipped_concerns(study: Study, points: Sequence[Facts]) -> list[str]:
     collated = study.collated
     if collated is None or not is_shipped(points):
         return []
-    if set(collated.sources) <= {point_source(module) for module in collated.systems}:
+    if set(collated.sources) <= {_source_now(module) for module in collated.systems}:
         return []
     return ["the code that computes points, or a package that it uses, has changed since"]
+
+
+def _source_now(module: str) -> str:
+    """Hash of the source, as it is now, of points with a module's system."""
+    with on_path(module):
+        return point_source(module)
 
 
 def table_concerns(study: Study, points: Sequence[Facts]) -> list[str]:

@@ -115,7 +115,7 @@ def _run_process(index: int, share: Sequence[object], mark: Path, folder: Path) 
     order = {"parent": os.getpid(), "while_exists": str(mark), "share": share, "workers": 1}
     with growing(mark.with_name(f"{index}.log")) as log:
         subprocess.run(
-            [sys.executable, "-m", "experiments.sweep.cluster"],
+            [sys.executable, "-P", "-m", "experiments.sweep.cluster"],
             input=json.dumps(order).encode(),
             stdout=log,
             stderr=log,

@@ -46,12 +46,12 @@ SMOKE = {
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder with the README's two files, from which modules can be imported."""
+    """A folder with the README's two files; it is not in the path until a config names a module."""
     module, config, _ = BLOCKS
     (tmp_path / "unicycle.py").write_text(module)
     (tmp_path / "conf" / "subject").mkdir(parents=True)
     (tmp_path / "conf" / "subject" / "unicycle.yaml").write_text(config)
-    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
     yield tmp_path
     sys.modules.pop("unicycle", None)
 
