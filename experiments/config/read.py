@@ -6,7 +6,7 @@ any work starts, and report all that is wrong at once: single values, then what 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
+from omegaconf.resolvers import oc
 
 from experiments.config.number_checks import (
     advice_count_problems,
@@ -54,6 +55,8 @@ __all__ = [
     "settings_of_record",
     "writable_results",
 ]
+
+_MARK = "variable_of_the_environment_"  # what stands for the value of one
 
 _Part = TypeVar("_Part", Settings, StudySettings)
 
@@ -147,7 +150,6 @@ def plain_tree(config: DictConfig) -> dict[str, Any]:
     """
     tree: Any = OmegaConf.to_container(config)
     tree.pop("hydra", None)
-    _refuse(_secret_problems(tree))
     return resolved_tree(OmegaConf.create(tree))
 
 
@@ -155,22 +157,47 @@ def resolved_tree(config: DictConfig) -> dict[str, Any]:
     """A config without Hydra's own part as resolved dicts and lists.
 
     Raises:
-        ConfigError: an interpolation that leads nowhere.
+        ConfigError: an interpolation that leads nowhere, or to what a record must not hold.
     """
+    # First with a mark for each variable of the environment, however a key comes to hold it.
+    asked: list[str] = []
+
+    def mark(name: str, *_: object) -> str:
+        asked.append(name)
+        return f"{_MARK}{name}"
+
+    marked = _resolved(config, mark)
+    if not asked:
+        return marked
+    written: Any = OmegaConf.to_container(config)
+    _refuse(_secret_problems(marked, flatten(written)))
+    return _resolved(config, oc.env)
+
+
+def _resolved(config: DictConfig, variable: Callable[..., Any]) -> dict[str, Any]:
+    """A config with every interpolation resolved, with a function for `oc.env`."""
+    OmegaConf.register_new_resolver("oc.env", variable, replace=True)
     try:
         resolved: Any = OmegaConf.to_container(config, resolve=True)
     except OmegaConfBaseException as error:
         raise ConfigError(f"{error.full_key}: {str(error).splitlines()[0]}") from None
+    finally:
+        OmegaConf.register_new_resolver("oc.env", oc.env, replace=True)
     return dict(resolved)
 
 
-def _secret_problems(tree: Mapping[str, Any]) -> Iterator[str]:
-    """Variables of the environment in what records keep; paths are not kept, or not secret."""
-    for key, value in flatten(dict(tree)).items():
-        if "oc.env:" in str(value) and key not in ("results", "demonstrations"):
+def _secret_problems(marked: Mapping[str, Any], written: Mapping[str, Any]) -> Iterator[str]:
+    """Variables of the environment in what records keep; paths are not kept, or not secret.
+
+    Args:
+        marked: a config with a mark in place of each variable.
+        written: the same before it was resolved, by dotted keys.
+    """
+    for key, value in flatten(dict(marked)).items():
+        if _MARK in str(value) and key not in ("results", "demonstrations"):
             yield (
-                f"{key}: {value} would be kept in records, where everybody can read a variable of "
-                "your environment; write its value, if that is no secret"
+                f"{key}: {written.get(key, value)} would be kept in records, where everybody can "
+                "read a variable of your environment; write its value, if that is no secret"
             )
 
 

@@ -17,7 +17,7 @@ from tqdm import tqdm
 from experiments.collate.join import collate
 from experiments.config.explain import explain
 from experiments.config.paths import results_folder
-from experiments.config.read import ConfigError, writable_results
+from experiments.config.read import ConfigError, resolved_tree, writable_results
 from experiments.config.settings import StudySettings, SweepSettings
 from experiments.sweep.combinations import Combinations
 from experiments.sweep.composer import Composer
@@ -51,6 +51,7 @@ class Planner(Sweeper):
     ) -> None:
         # The task of a single run ends the process when it fails; a sweep's point fails alone.
         self._loader, self._base = hydra_context.config_loader, config
+        resolved_tree(config.hydra.sweeper)  # refuses what records must not hold
         self._launcher = Plugins.instance().instantiate_launcher(
             hydra_context=hydra_context, task_function=run_task, config=config
         )

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from omegaconf import OmegaConf
 from refusals import refusal
 from tiny_point import composed, planned
 
 from experiments.config.paths import CONF
-from experiments.config.read import ConfigError, read_config
+from experiments.config.read import ConfigError, plain_tree, read_config
 from experiments.config.settings import Region
 
 
@@ -395,3 +396,35 @@ def test_results_that_cannot_be_written_are_refused_before_any_work(
         words = [*words, "scale=smoke", f"results={tmp_path / name}"]
         assert message in refusal(words, monkeypatch, capsys)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+HIDDEN = [
+    ["results=${oc.env:HOME}", "truth.name=${results}"],
+    ["hydra.job.name=${oc.env:HOME}", "truth.name=${hydra:job.name}"],
+    ["truth.name=${oc.env :HOME}"],
+    ["truth.name='a_${oc.decode:${oc.env:HOME}}'"],
+    ["-m", "truth.name=${oc.env:HOME}", "seed=0,1"],
+    ["-m", "+hydra.sweeper.params={truth.name:'${oc.env:HOME}'}"],
+]
+
+
+@pytest.mark.parametrize("words", HIDDEN, ids=" ".join)
+def test_a_variable_of_the_environment_is_refused_however_a_record_would_hold_it(
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", "the_secret")
+    said = refusal(words, monkeypatch, capsys)
+    assert "truth.name: " in said
+    assert "would be kept in records" in said
+    assert "the_secret" not in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_path_may_hold_a_variable_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", "/home/me")
+    tree = {"results": "${oc.env:HOME}/out", "dt": 0.5}
+    assert plain_tree(OmegaConf.create(tree)) == {"results": "/home/me/out", "dt": 0.5}
