@@ -5,8 +5,10 @@ Whether a job has ended is read from `squeue`, so that no accounting is needed.
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -19,6 +21,7 @@ from experiments.config.read import ConfigError
 from experiments.sweep.cluster import ClusterLauncher, Share, run_share
 
 _ANSWER = 60.0  # [s] that squeue may take
+_SILENCE = 3600.0  # [s] without an answer of squeue after which it is asked no more
 _PATIENCE = 3  # looks at the queue in which a job must be absent before it counts as ended
 _SUBMISSION = {  # what submitit calls our own options
     "partition": "slurm_partition",
@@ -57,7 +60,7 @@ class SlurmLauncher(ClusterLauncher):
         try:
             self._wait(ids)
         finally:
-            subprocess.run(["scancel", *{job_id.partition("_")[0] for job_id in ids}], check=False)
+            _cancel(ids)
             for pickled in folder.glob("*.pkl"):
                 pickled.unlink()
         return [f"SLURM job {job_id}" for job_id in ids]
@@ -66,7 +69,8 @@ class SlurmLauncher(ClusterLauncher):
         """Hand the shares to SLURM; returns each one's job id, such as 12_3."""
         import submitit  # an extra
 
-        executor = submitit.AutoExecutor(folder, cluster="slurm")
+        python = f"{shlex.quote(sys.executable)} -P"  # the current folder is no place for modules
+        executor = submitit.AutoExecutor(folder, cluster="slurm", slurm_python=python)
         executor.update_parameters(name="mlci", **self.resources)
         try:
             jobs = executor.map_array(run_share, shares, [self.workers] * len(shares))
@@ -78,8 +82,11 @@ class SlurmLauncher(ClusterLauncher):
         return [job.job_id for job in jobs]
 
     def _wait(self, ids: Sequence[str]) -> None:
-        """Until no job is in the queue any more; looks at no file, of which there may be many."""
-        absent, silent = dict.fromkeys(ids, 0), False
+        """Until no job is in the queue any more, or `squeue` has been silent for too long.
+
+        It looks at no file, of which there may be many.
+        """
+        absent, silent, answered = dict.fromkeys(ids, 0), False, time.monotonic()
         with tqdm(total=len(ids), unit="job", disable=None) as bar:
             while min(absent.values()) < _PATIENCE:
                 time.sleep(self.poll)
@@ -88,14 +95,26 @@ class SlurmLauncher(ClusterLauncher):
                     if not silent:
                         print("squeue does not answer; it is asked again", flush=True)
                     silent = True
+                    if time.monotonic() - answered > _SILENCE:
+                        print(f"squeue was silent for {_SILENCE:g} s; the jobs are cancelled")
+                        return
                     continue
-                silent = False
+                silent, answered = False, time.monotonic()
                 absent = {job_id: 0 if job_id in queue else n + 1 for job_id, n in absent.items()}
                 ended = sum(n >= _PATIENCE for n in absent.values())
                 if bar.disable and ended > bar.n:
                     print(f"[{ended}/{len(ids)}] jobs ended", flush=True)
                 bar.n = ended
                 bar.refresh()
+
+
+def _cancel(ids: Sequence[str]) -> None:
+    """Cancel the arrays of some jobs, if SLURM answers."""
+    arrays = sorted({job_id.partition("_")[0] for job_id in ids})
+    try:
+        subprocess.run(["scancel", *arrays], check=False, timeout=_ANSWER)
+    except subprocess.TimeoutExpired:
+        print(f"scancel does not answer; cancel by hand: scancel {' '.join(arrays)}", flush=True)
 
 
 def _queue(ids: Sequence[str]) -> set[str] | None:

@@ -154,3 +154,26 @@ def test_jobs_are_asked_for_by_their_ids(
     monkeypatch.setenv("USER", "somebody_else")
     monkeypatch.setattr(slurm, "_ANSWER", 1.0 if "sleep" in code else 60.0)
     assert slurm._queue(["7_0", "7_1", "8_1"]) == ANSWERS[code]
+
+
+@pytest.mark.parametrize("code", ["import sys\nsys.exit(1)", "import time\ntime.sleep(60)"])
+def test_a_queue_that_never_answers_is_given_up(
+    code: str,
+    cluster: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for name in ("squeue", "scancel"):
+        (tmp_path / "bin" / name).write_text(f"#!{sys.executable}\n{code}\n")
+    monkeypatch.setattr(slurm, "_ANSWER", 0.2)
+    monkeypatch.setattr(slurm, "_SILENCE", 0.3)
+    slurm.SlurmLauncher(1, 0.05, False, cpus_per_task=1)._wait(["7_0"])
+    slurm._cancel(["7_0", "7_1"])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == [
+        "squeue does not answer; it is asked again",
+        "squeue was silent for 0.3 s; the jobs are cancelled",
+    ]
+    late = ["scancel does not answer; cancel by hand: scancel 7"] * ("sleep" in code)
+    assert lines[2:] == late
