@@ -10,13 +10,14 @@ if __name__ == "__main__":  # before all that takes time to import
     sys.exit(app.results())
 
 import argparse
+import io
 import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from experiments.config.paths import CHECKOUT, default_results
-from experiments.lookback.archive import Archive, ArchiveError, Facts
+from experiments.lookback.archive import Archive, ArchiveError, Facts, reason
 from experiments.lookback.cleaning import clean, empty_trash
 from experiments.lookback.freshness import is_shipped, point_concerns
 from experiments.lookback.query import select
@@ -69,18 +70,26 @@ def main() -> int:
         0; 2 if something that was asked for is not there.
     """
     options = _parser().parse_args()
-    archive = Archive((options.results or default_results()).resolve())
+    results = Path(os.path.realpath(options.results or default_results()))
+    if isinstance(sys.stdout, io.TextIOWrapper):  # names of files need not suit a terminal
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        for line in options.command(archive, options):
+        if results.exists() and not results.is_dir():
+            raise ArchiveError(f"--results: {results} is no folder")
+        for line in options.command(Archive(results), options):
             print(line)
-        sys.stdout.flush()
+        print(end="", flush=True)
     except ArchiveError as error:
         complain(str(error))
         return 2
-    except BrokenPipeError:  # somebody has read enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
-        complain(f"{error.filename}: {error.strerror}")
+        try:
+            print(end="", flush=True)
+        except OSError:  # it would be tried again as this process ends
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):  # somebody has read enough
+            return 0
+        complain(reason(error))
         return 2
     return 0
 
@@ -203,7 +212,7 @@ def _export(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     if options.out is None:
         yield data.decode().rstrip("\n")
     else:
-        replace_file(options.out.resolve(), data)
+        _write(options.out, data)
         yield f"written: {options.out} ({counted(len(table), 'row')}, {table.shape[1]} columns)"
 
 
@@ -218,11 +227,20 @@ def _demonstrations(archive: Archive, options: argparse.Namespace) -> Iterator[s
 
 def _page(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """The page of a point."""
+    from experiments.config.problems import ConfigError
     from experiments.page.of_point import point_page  # what infers takes a second to import
+    from experiments.point.no_answer import NoAnswer
 
     facts = _point(archive, options.point)
     path = options.out or Path(f"page-{facts.point.identity[:12]}.html")
-    replace_file(path.resolve(), point_page(facts).encode())
+    try:
+        page = point_page(facts)
+    except (ConfigError, NoAnswer) as error:
+        raise ArchiveError(f"{facts.point.identity}: {error}") from None
+    except (LookupError, TypeError) as error:
+        message = f"{facts.point.identity}: its record is not as points write them: {error!r}"
+        raise ArchiveError(message) from None
+    _write(path, page.encode())
     yield f"written: {path}"
 
 
@@ -234,6 +252,21 @@ def _clean(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
 def _empty_trash(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """What was cleaned, removed for good."""
     return empty_trash(archive.results)
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Write what was asked for into a file.
+
+    Raises:
+        ArchiveError: it cannot be written, or there is something else, such as a device.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        if target.exists() and not target.is_file():
+            raise ArchiveError(f"--out: {path} is no file, which could be replaced")
+        replace_file(target, data)
+    except OSError as error:
+        raise ArchiveError(f"--out: {path} cannot be written: {error.strerror}") from None
 
 
 def _point(archive: Archive, name: str) -> Facts:

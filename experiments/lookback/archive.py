@@ -17,8 +17,10 @@ import yaml
 
 from experiments.config.suggestions import did_you_mean
 from experiments.tracking.files import read_file
+from experiments.tracking.forms import is_deep, record_fault, study_fault
 from experiments.tracking.names import is_identity
-from experiments.tracking.points import Point, State
+from experiments.tracking.own_modules import on_path
+from experiments.tracking.points import Point, State, system_module
 from experiments.tracking.study import Study, StudyError, read_study
 from experiments.tracking.study_tables import table_changes
 from experiments.tracking.trees import flatten
@@ -28,6 +30,12 @@ KINDS = ("points", "store", "diffs", "inference", "trash")  # folders of results
 
 class ArchiveError(Exception):
     """Something that was asked for and is not there; the message says what is."""
+
+
+def reason(error: OSError) -> str:
+    """What the system says, and of which file where it tells."""
+    words = error.strerror or str(error)
+    return words if error.filename is None else f"{error.filename}: {words}"
 
 
 @dataclass(frozen=True)
@@ -44,16 +52,19 @@ class Facts:
 
     @cached_property
     def record(self) -> dict[str, Any]:
-        """Its record; empty unless it finished and its files are as they were written."""
-        return self.point.record() or {}
+        """Its record; empty unless it finished, and record and files are as points write them."""
+        return {} if self._fault else self._record
 
     @cached_property
     def state(self) -> State:
         """Its state when it was first asked for; missing if it cannot be read."""
         if self.is_shipped:
             return State.SHIPPED
+        if self._fault:
+            return State.MISSING
         try:
-            return self.point.state()
+            with on_path(system_module(self.record.get("config", {}))):  # to read its source
+                return self.point.state()
         except OSError:
             return State.MISSING
 
@@ -62,10 +73,37 @@ class Facts:
         """Why its record does not count, although there is one."""
         if self.is_shipped:
             return None
+        if self._fault:
+            return f"{self.point.folder / 'record.json'} is no record of a point: {self._fault}"
         try:
-            return self.point.damage()
+            damage = self.point.damage()
+            if damage is None and self.state is State.MISSING:
+                self.point.is_running()  # perhaps nobody can tell, as its lock is a folder
         except OSError as error:
-            return f"{error.filename}: {error.strerror}"
+            return reason(error)
+        return damage
+
+    @cached_property
+    def failure(self) -> dict[str, Any] | None:
+        """How its last attempt failed; None if it did not, or left nothing that can be read."""
+        try:
+            failure = self.point.failure()
+        except (OSError, RecursionError):
+            return None
+        return None if is_deep(failure) else failure
+
+    @cached_property
+    def _record(self) -> dict[str, Any]:
+        """Its record if it is whole, whatever it holds."""
+        return self.point.record() or {}
+
+    @cached_property
+    def _fault(self) -> str | None:
+        """What keeps a whole record from being one that a point wrote; None if nothing does."""
+        try:
+            return record_fault(self._record) if self._record else None
+        except RecursionError:
+            return "it nests too deep"
 
     @cached_property
     def config(self) -> dict[str, Any]:
@@ -77,9 +115,12 @@ class Facts:
         """The row of its summary table, opened by its columns; empty unless it finished."""
         if "summary.csv" not in self.record.get("files", {}):
             return {}
-        text = read_file(self.point.folder / "summary.csv").decode()
-        row = next(csv.DictReader(io.StringIO(text)), {})
-        return {key: value_of(text) for key, text in row.items()}
+        try:
+            text = read_file(self.point.folder / "summary.csv").decode()
+            row: dict[Any, Any] = next(csv.DictReader(io.StringIO(text)), {})
+        except (OSError, ValueError, csv.Error):
+            return {}
+        return {key: value_of(text) for key, text in row.items() if key and text is not None}
 
 
 @dataclass(frozen=True)
@@ -98,12 +139,13 @@ class Archive:
         listings: dict[str, Study | StudyError] = {}
         for folder in self._folders:
             try:
-                study = read_study(folder)
+                if (study := read_study(folder)) is None:
+                    continue
+                if fault := study_fault(study):
+                    raise StudyError(f"{folder / 'study.json'} is no listing of a study: {fault}")
+                listings[folder.name] = study
             except StudyError as error:
                 listings[folder.name] = error
-            else:
-                if study is not None:
-                    listings[folder.name] = study
         return listings
 
     @property
@@ -245,5 +287,5 @@ def value_of(text: str) -> Any:
             pass
     try:
         return yaml.safe_load(text)
-    except yaml.YAMLError:
-        return text
+    except (yaml.YAMLError, ValueError, TypeError, AttributeError, RecursionError):
+        return text  # such as a date that no calendar has

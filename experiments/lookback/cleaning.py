@@ -14,7 +14,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from experiments.lookback.archive import Archive, ArchiveError
+from experiments.lookback.archive import Archive, ArchiveError, reason
 from experiments.tracking.files import PART, read_file
 from experiments.tracking.locks import plan_lock
 from experiments.tracking.names import inner_path, is_identity, is_name
@@ -72,7 +72,7 @@ def clean(archive: Archive, *, remove: bool) -> Iterator[str]:
         else:
             yield from _clean(archive, remove=False)
     except OSError as error:
-        raise ArchiveError(f"nothing more is cleaned: {error.filename}: {error.strerror}") from None
+        raise ArchiveError(f"nothing more is cleaned: {reason(error)}") from None
 
 
 def empty_trash(results: Path) -> Iterator[str]:
@@ -89,7 +89,7 @@ def empty_trash(results: Path) -> Iterator[str]:
             shutil.rmtree(folder)
             yield f"removed: {folder} ({size / 1e6:.2f} MB)"
     except OSError as error:
-        raise ArchiveError(f"{error.filename}: {error.strerror}") from None
+        raise ArchiveError(reason(error)) from None
     if not folders:
         yield f"nothing in {trash}"
 
@@ -145,7 +145,10 @@ def leftovers(archive: Archive) -> tuple[list[Leftover], list[str]]:
         if identity not in used | running
     ]
     notes = [f"point {name[:12]} is kept: it is running" for name in sorted(running - used)]
-    records = [points[name].note("record") if name in points else None for name in sorted(used)]
+    try:
+        records = [points[name].note("record") if name in points else None for name in sorted(used)]
+    except RecursionError:
+        raise ArchiveError("nothing is cleaned: a record.json nests too deep") from None
     if running or not all(records):
         notes.append("the store is kept: some study is running, or not finished")
     else:

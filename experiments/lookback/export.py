@@ -26,7 +26,11 @@ def tidy_table(points: Sequence[Facts], measure: str) -> pd.DataFrame:
         if name not in record["files"]:
             known = ", ".join(Path(file).stem for file in record["files"] if file.endswith(".csv"))
             raise ArchiveError(f"{measure}: no such table; there are {known}")
-        table = pd.read_csv(io.BytesIO(read_file(facts.point.folder / name)))
+        try:
+            table = pd.read_csv(io.BytesIO(read_file(facts.point.folder / name)))
+        except ValueError as error:
+            place = f"{facts.point.folder / name}"
+            raise ArchiveError(f"{place} is no table: {error}; run the point again") from None
         front: dict[str, object] = {
             "point": facts.point.identity,
             "state": str(facts.state),

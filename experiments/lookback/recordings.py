@@ -10,7 +10,7 @@ import pandas as pd
 
 from experiments.lookback.archive import ArchiveError, Facts
 from experiments.tracking.files import read_file
-from experiments.tracking.store import Store
+from experiments.tracking.store import Store, Stored
 from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.recordings.write import write_demonstration
 from mlci.spaces import Box, StateSpace
@@ -28,28 +28,40 @@ def write_recordings(facts: Facts, folder: Path) -> list[Path]:
 
     Raises:
         ArchiveError: the point has not finished, its stored demonstrations were removed, or the
-            folder holds something.
+            folder holds something; or what is stored is not as a point writes it.
     """
     identity = facts.point.identity
     if not facts.record:
         raise ArchiveError(f"{identity}: has not finished; run it first")
     store = Store(facts.point.results / "store")
-    trials = store.read("demonstrations", facts.record["stages"]["demonstrations"])
+    trials = store.read("demonstrations", facts.record["stages"].get("demonstrations", ""))
     if trials is None:
         raise ArchiveError(f"{identity}: its stored demonstrations are gone; run it again")
     if folder.exists() and any(folder.iterdir()):
         raise ArchiveError(f"{folder}: is not empty, and what it holds would be ranked as well")
+    try:
+        space, demonstrations = _space(facts), _demonstrations(facts, trials)
+    except (LookupError, ValueError, TypeError) as error:
+        raise ArchiveError(
+            f"{identity}: its demonstrations are not as points write them: {error}"
+        ) from None
     folder.mkdir(parents=True, exist_ok=True)
-    space, dt = _space(facts), facts.config["demonstrations.dt"]
-    files = []
+    files = [folder / f"trial_{number:03d}.csv" for number in demonstrations]
+    for path, demonstration in zip(files, demonstrations.values(), strict=True):
+        write_demonstration(path, demonstration, space)
+    return files
+
+
+def _demonstrations(facts: Facts, trials: Stored) -> dict[int, Demonstration]:
+    """The demonstrations of a point by their numbers, from what is stored of all trials."""
+    dt, demonstrations = facts.config["demonstrations.dt"], {}
     for number in pd.read_csv(io.BytesIO(read_file(facts.point.folder / "trials.csv")))["trial"]:
         goal = Box(trials["goal_lower"][number], trials["goal_upper"][number])
         task = Task(trials["starts"][number], goal, facts.config["horizon"])
-        files.append(folder / f"trial_{number:03d}.csv")
         states, controls = trials["states"][number], trials["controls"][number]
-        demonstration = Demonstration(task, states, controls, even_times(len(states), dt))
-        write_demonstration(files[-1], demonstration, space)
-    return files
+        times = even_times(len(states), dt)
+        demonstrations[int(number)] = Demonstration(task, states, controls, times)
+    return demonstrations
 
 
 def _space(facts: Facts) -> StateSpace:

@@ -125,7 +125,7 @@ def point_facts(archive: Archive, facts: Facts) -> Iterator[str]:
         yield from _shipped_lines(facts, archive)
     if facts.damage:
         yield f"         its record does not count: {facts.damage}"
-    if failure := point.failure():
+    if failure := facts.failure:
         reasons = flatten({key: value for key, value in failure.items() if key != "traceback"})
         yield from ["", "failure", *_fact_lines(reasons)]
         yield from f"{failure.get('traceback')}".splitlines()

@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from experiments.tracking.files import digest, read_file
+from experiments.tracking.forms import sound_study
 from experiments.tracking.names import inner_path, is_digest, is_name
 from experiments.tracking.sealed import SealError, read_sealed, write_sealed
 from experiments.tracking.sources import source_hash
-from experiments.tracking.study import Collated, whole_study
+from experiments.tracking.study import Collated
 
 NOTE = "figures.json"
 SUFFIXES = (".png", ".pdf", ".txt")
@@ -27,7 +28,7 @@ _FIGURES = "paper_figures"  # the package whose modules draw
 
 def sentence(folder: Path) -> str:
     """The origin of a study's data in words: points and commit."""
-    study = whole_study(folder)
+    study = sound_study(folder)
     if study is None or study.collated is None or not study.collated.points:
         return f"study {folder.name}, whose points are not listed"
     collated = study.collated
@@ -144,7 +145,7 @@ def _drawing_source(module: str) -> str:
 
 def _data_origin(folder: Path) -> dict[str, Any] | None:
     """Points, source and commits behind a study's tables; None if they are not listed."""
-    study = whole_study(folder)
+    study = sound_study(folder)
     if study is None or study.collated is None or not study.collated.points:
         return None
     collated = study.collated
