@@ -26,7 +26,7 @@ from paper_figures.report import (
     section_wrong_model,
 )
 from paper_figures.report.earlier import changes
-from paper_figures.report.markdown import contents, figure, table
+from paper_figures.report.markdown import contents, figure, table, without_markup
 from paper_figures.report.study_tables import Missing, Results, absent
 from paper_figures.report.verdict import RULES, Claim
 
@@ -185,7 +185,7 @@ def report(results: Results) -> str:
     verdicts = ("Verdicts", f"{_verdicts(claims)}\n{RULES}\n{changes(claims)}")
     lines = [_INTRODUCTION, contents(heading for heading, _ in (verdicts, *parts))]
     lines += [f"## {heading}\n\n{text}" for heading, text in (verdicts, *parts)]
-    return "\n".join(line.rstrip("\n") + "\n" for line in lines)
+    return without_markup("\n".join(line.rstrip("\n") + "\n" for line in lines))
 
 
 def _claims(results: Results) -> list[Claim | Missing]:

@@ -7,6 +7,10 @@ from collections.abc import Iterable, Sequence
 
 import pandas as pd
 
+_FIGURE = (
+    r"Figure \d+\]\((?:\.\./[\w-]+/)?figures/[\w.-]+\)"  # as `figure` writes it, without its ![
+)
+
 
 def number(value: float, digits: int = 3) -> str:
     """A number with some significant digits; a dash where there is none."""
@@ -35,7 +39,16 @@ def between(value: str, low: str, high: str) -> str:
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], words: int = 1) -> str:
     """A table whose first columns, `words` of them, hold words, and the others numbers."""
     lines = [head, ["---"] * words + ["---:"] * (len(head) - words), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+    return "".join(f"| {' | '.join(map(_cell, line))} |\n" for line in lines)
+
+
+def without_markup(text: str) -> str:
+    """A text of pieces whose words may be of somebody's files: no HTML, and no picture but figures.
+
+    Not every program that shows Markdown leaves these out.
+    """
+    text = re.sub(r"<(?=[A-Za-z/!?])", "&lt;", text)
+    return re.sub(rf"!\[(?!{_FIGURE}$)", r"!\[", text, flags=re.MULTILINE)
 
 
 def by_dt(rows: pd.DataFrame, column: str) -> str:
@@ -55,6 +68,11 @@ def by_dt(rows: pd.DataFrame, column: str) -> str:
             for truth, cells in lines
         ],
     )
+
+
+def _cell(value: object) -> str:
+    """A cell, which ends no line and no column."""
+    return re.sub(r"(?<!\\)\|", r"\|", " ".join(str(value).splitlines()))
 
 
 def figure(path: str, number: int, caption: str) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.tracking.files import digest
+from experiments.tracking.forms import study_fault
 from experiments.tracking.study import StudyError, read_study
 from experiments.tracking.study_tables import TableError, read_tables
 from experiments.tracking.trees import plain
@@ -90,6 +91,8 @@ class Results:
         """
         try:
             listed = read_study(self.folder / study)
+            if listed is not None and (fault := study_fault(listed)):
+                raise StudyError(f"{self.folder / study / 'study.json'} is no listing: {fault}")
         except StudyError as error:
             self.damage.append(str(error))
             listed = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import nullcontext
 from html.parser import HTMLParser
 from itertools import product
 from pathlib import Path
@@ -15,6 +16,7 @@ from scipy import stats
 from experiments.config.paths import CHECKOUT
 from experiments.tracking.files import digest
 from experiments.tracking.sealed import write_sealed
+from experiments.tracking.study import Collated, Study
 from paper_figures.report import __main__ as command_line
 from paper_figures.report import (
     claim_1,
@@ -578,3 +580,26 @@ def test_the_command_writes_two_files_and_no_other(
     monkeypatch.setattr("sys.argv", [*sys.argv, "--results", str(results.folder / "none")])
     with pytest.raises(SystemExit, match=r"no study in .*none: run one first"):
         command_line.main()
+
+
+def test_words_of_files_are_no_markup() -> None:
+    """Neither HTML, nor a picture that is fetched, nor a line or column of their own."""
+    evil = "<script>x</script>\n|![y](http://z)"
+    text = markdown.without_markup(markdown.table(["truth", "n"], [[evil, 1]]))
+    assert text.splitlines()[2:] == [r"| &lt;script>x&lt;/script> \|!\[y](http://z) | 1 |"]
+    for path in ("figures/a_b.png", "../telescope/figures/a.png"):
+        whole = markdown.figure(path, 3, "p < 0.01")
+        assert markdown.without_markup(whole) == whole
+    assert "!\\[Figure 1]" in markdown.without_markup("![Figure 1](http://z/figures/a.png)")
+
+
+def test_a_forged_listing_is_damage(tmp_path: Path) -> None:
+    point = "0" * 32
+    of_nobody = {"sources": {}, "systems": (), "made_by": "", "versions": (), "tables": {}}
+    for commits, damage in (("c0ffee",), 0), ((3,), 1):
+        collated = Collated(points=(point,), commits=commits, dirty=False, **of_nobody)
+        Study(tmp_path / "s", {point: ()}, {}, collated).save()
+        results = Results(tmp_path)
+        with nullcontext() if damage == 0 else pytest.raises(Missing):
+            assert results.listing("s")["commits"] == list(commits)
+        assert len(results.damage) == damage
