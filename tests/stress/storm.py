@@ -9,8 +9,11 @@ import dataclasses
 import json
 import os
 import random
+import re
+import shlex
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -93,44 +96,100 @@ def undisturbed(base: Path) -> dict[str, bytes]:
     return tables(base / "calm", "s")
 
 
+class Crowd:
+    """What others do to results meanwhile: `clean --yes` and figures, again and again."""
+
+    def __init__(self, folder: Path) -> None:
+        python, results = shlex.quote(sys.executable), shlex.quote(str(folder / "results"))
+        clean = f"{python} {TESTS.parent}/experiments/results.py clean --yes --results {results}"
+        draw = f"{python} -m paper_figures s --jobs 1 --results {results}"
+        loop = f"while :; do {clean}; echo clean: $?; {draw}; echo figures: $?; done"
+        self.log = folder / "crowd.txt"
+        with open(self.log, "wb") as log:
+            self.process = subprocess.Popen(
+                ["bash", "-c", loop],
+                cwd=TESTS.parent,
+                env={**os.environ, "PYTHONPATH": str(TESTS.parent)},
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+
+    def stop(self) -> Counter[str]:
+        """End it, and check that nothing was wrong; returns how its commands ended."""
+        kill([self.process.pid])
+        self.process.wait(timeout=60)
+        kill(pids(self.process.pid))
+        text = self.log.read_text()
+        assert "Traceback" not in text, text
+        assert "\nmoved: " not in text, f"something was taken that is used: {text}"
+        ends = Counter(re.findall(r"^(?:clean|figures): \d+$", text, re.M))
+        assert set(ends) <= {"clean: 0", "clean: 2", "figures: 0", "figures: 1"}, ends
+        return ends
+
+
 def kill_storm(base: Path) -> None:
-    """Kill the parent and workers at random moments; resume; compare with an undisturbed run."""
+    """Kill sweeps at random moments, resume, and compare with an undisturbed run.
+
+    Meanwhile there are `clean --yes`, figures, and a second sweep of the same study, which is
+    killed now and then, and otherwise goes on.
+    """
     chance = random.Random(SEED)
     expected = undisturbed(base)
     kills: Counter[str] = Counter()
+    ends: Counter[str] = Counter()
     slowest, storms = 0.0, 0
     while kills.total() < KILLS:
         storms += 1
         folder, sweep = folder_for(base, f"storm{storms}")
+        crowd, second = Crowd(folder), start(folder, *sweep)
         while kills.total() < KILLS:
             process = start(folder, *sweep)
             time.sleep(chance.uniform(0.5, 8.0))
-            if process.poll() is not None:
-                break
             victims = chance.choice(["parent", "worker", "workers", "all"])
-            group = pids(process.pid)
-            others = [pid for pid in group if pid != process.pid]
-            if victims == "worker":
-                others = chance.sample(others, min(1, len(others)))
-            if victims != "parent":
-                kill(others)
-                time.sleep(chance.uniform(0.0, 3.0))
-            if process.poll() is not None:
+            if not strike(process, victims, chance):
+                process.communicate(timeout=600)
                 break
-            if victims == "all":
-                kill(pids(process.pid))
-            kill([process.pid])
             began = time.monotonic()
             process.communicate(timeout=60)
             assert gone(process.pid, patience=10), f"orphans: {running(process.pid)}"
             slowest = max(slowest, time.monotonic() - began)
             kills[victims] += 1
+            if chance.random() < 0.5:
+                kill(pids(second.pid))
+                second.communicate(timeout=60)
+                second = start(folder, *sweep)
         finish(folder, sweep)
+        out, err = second.communicate(timeout=600)
+        # A point whose worker was killed has failed, for whoever waited for it.
+        is_told = second.returncode == 1 and "points failed" in err
+        assert second.returncode == 0 or is_told, f"{out}\n{err}"
+        ends += crowd.stop()
         check_whole(folder, 24, expected)
+        assert not (folder / "results" / "trash").exists()
     print(
-        f"kill storm: {kills.total()} kills ({dict(kills)}) over {storms} sweeps of 24 points; "
-        f"tables equal; the last process was gone {slowest:.2f} s after its parent"
+        f"kill storm: {kills.total()} kills ({dict(kills)}) over {storms} sweeps of 24 points, "
+        f"each beside a second one and a crowd ({dict(ends)}); tables equal; the last process "
+        f"was gone {slowest:.2f} s after its parent"
     )
+
+
+def strike(process: subprocess.Popen[str], victims: str, chance: random.Random) -> bool:
+    """Kill a sweep's parent, and some or all of its workers before; False if it has ended."""
+    if process.poll() is not None:
+        return False
+    others = [pid for pid in pids(process.pid) if pid != process.pid]
+    if victims == "worker":
+        others = chance.sample(others, min(1, len(others)))
+    if victims != "parent":
+        kill(others)
+        time.sleep(chance.uniform(0.0, 3.0))
+    if process.poll() is not None:
+        return False
+    if victims == "all":
+        kill(pids(process.pid))
+    kill([process.pid])
+    return True
 
 
 def pids(group: int) -> list[int]:
@@ -258,7 +317,9 @@ def main() -> None:
     for storm in (overhead, collating, kill_storm, terminated, two_at_once, full_disk):
         if sys.argv[1:] and storm.__name__ not in sys.argv[1:]:
             continue
+        began = time.monotonic()
         storm(base)
+        print(f"{storm.__name__}: {time.monotonic() - began:.0f} s")
     shutil.rmtree(base)
 
 
