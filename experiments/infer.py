@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pandas as pd
 
@@ -27,7 +28,6 @@ from experiments.page.document import page
 from experiments.point.forecasts import recorded_calibration
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import plausibilities, read_recordings, together
-from experiments.point.truth_tables import dimension_table
 from experiments.progress import begin, steps_shown
 from experiments.terminal import complain, counted, entry
 from experiments.tracking.environment import environment
@@ -39,13 +39,12 @@ from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
 from mlci.inference import Inference
+from mlci.plot import draw_map, png
 from mlci.recordings.plausibility import Plausibility, summary
 from mlci.recordings.read import Readings
 from mlci.recordings.recording import Remark, shown_path
 from mlci.tabular import TabularModel, discretize
 from mlci.temperature import estimate_temperature
-from paper_figures import hypothesis_map
-from paper_figures.style import save
 
 ON_WRONG_MODELS = (
     'results/paper/REPORT.md, "Demonstrators who are not the nominal model", for how often answers '
@@ -191,7 +190,7 @@ def _save(
     checks: Sequence[Plausibility],
 ) -> Path:
     """Write tables, map and record into a folder of their own, named by what went in."""
-    space = settings.model.space
+    space, inference = settings.model.space, result.inference
     paths = _path_table(demonstrations, space.names)
     # What decides the result: the settings that do, and the numbers that were read.
     made_from = {
@@ -201,10 +200,10 @@ def _save(
     }
     results = results_folder(settings) / "inference"
     folder = results / digest(canonical_json(made_from))[:16]
-    tables = {"hypotheses": ranking, **_demonstration_tables(demonstrations, result.inference)}
+    tables = {"hypotheses": ranking, **_demonstration_tables(demonstrations, inference)}
     for name, table in tables.items():
         replace_file(folder / f"{name}.csv", csv_bytes(table))
-    save(hypothesis_map.draw(ranking, paths, dimension_table(space)), folder / "map")
+    replace_file(folder / "map.png", _map(inference, demonstrations))
     answer_record = {**result.record(), "recordings": [each.record(space) for each in checks]}
     replace_file(folder / "answer.json", _json_bytes(answer_record))
     record = {
@@ -215,6 +214,13 @@ def _save(
     }
     replace_file(folder / "record.json", _json_bytes(record))
     return folder
+
+
+def _map(inference: Inference, demonstrations: Sequence[Demonstration]) -> bytes:
+    """The map as a PNG; a user's own matplotlibrc, such as text.usetex, is for other figures."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        return png(draw_map(inference, demonstrations))
 
 
 def _page(

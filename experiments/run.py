@@ -31,7 +31,9 @@ def main() -> int:
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # which it is below nohup
         signal.signal(signal.SIGHUP, signal.default_int_handler)
     register_plugins()
-    status = run_command("config", _run_single, failures=(SweepFailed, CollateError, NoAnswer))
+    status = run_command(
+        "config", _run_single, failures=(SweepFailed, CollateError, NoAnswer), may_sweep=True
+    )
     if status == STOPPED:
         print("stopped; what has finished is kept: the same command runs the rest", file=sys.stderr)
     return status

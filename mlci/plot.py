@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -50,6 +51,7 @@ def draw_map(
     # Gains spread over decades: the square root keeps the small ones apart from none.
     scale = PowerNorm(0.5, 0.0, max(float(finite.max(initial=0.0)), _NEARLY_NONE))
     colours = ScalarMappable(scale, _COLOURS)
+    shapes, faces = [], []
     for i in np.argsort(-rank, kind="stable"):
         colour: Any = colours.to_rgba(np.clip(gain[i], 0.0, scale.vmax))
         if gain[i] == -np.inf:
@@ -57,14 +59,14 @@ def draw_map(
         elif gain[i] == np.inf:
             colour = _UNAVOIDABLE
         boxes = plane.rectangles(regions.box(int(i)))
-        for left, right, low, high in boxes:
-            patch = Rectangle((left, low), right - left, high - low, facecolor=colour)
-            patch.set(edgecolor=_EDGE, linewidth=0.4)
-            axes.add_patch(patch)
+        shapes += [Rectangle((a, low), b - a, high - low) for a, b, low, high in boxes]
+        faces += [colour] * len(boxes)
         if boxes and rank[i] <= TOP and gain[i] > 0:
             _number(axes, boxes[0], float(rank[i]))
-    for demonstration in demonstrations:
-        _draw_path(axes, plane, demonstration)
+    # One collection, as drawing takes a time for each artist.
+    axes.add_collection(PatchCollection(shapes, facecolor=faces, edgecolor=_EDGE, linewidth=0.4))
+    if demonstrations:
+        _draw_paths(axes, plane, demonstrations)
     _dress(axes, plane)
     label = "gain [nat], colours by its square root"
     axes.get_figure(root=True).colorbar(colours, ax=axes, label=label)  # type: ignore[union-attr]
@@ -87,13 +89,16 @@ def html_image(axes: Axes) -> str:
     )
 
 
-def _draw_path(axes: Axes, plane: Plane, demonstration: Demonstration) -> None:
-    """A path, cut where a dimension goes round."""
-    pieces = plane.pieces(demonstration.states)
-    for piece in pieces:
-        axes.plot(*piece.T, color=_PATH, linewidth=0.6, alpha=0.6)
-    axes.plot(*pieces[0][0], "o", color=_PATH, markersize=2.5)
-    axes.plot(*pieces[-1][-1], "s", color=_PATH, markersize=2.5)
+def _draw_paths(axes: Axes, plane: Plane, demonstrations: Sequence[Demonstration]) -> None:
+    """Paths, cut where a dimension goes round."""
+    paths = [plane.pieces(demonstration.states) for demonstration in demonstrations]
+    pieces = [piece for path in paths for piece in path]
+    axes.add_collection(LineCollection(pieces, colors=_PATH, linewidths=0.6, alpha=0.6, zorder=2))
+    for marker, ends in (
+        ("o", [path[0][0] for path in paths]),
+        ("s", [path[-1][-1] for path in paths]),
+    ):
+        axes.plot(*np.transpose(ends), marker, color=_PATH, markersize=2.5)
 
 
 def _number(axes: Axes, box: tuple[float, float, float, float], rank: float) -> None:

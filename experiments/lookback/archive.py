@@ -16,6 +16,7 @@ from typing import Any
 import yaml
 
 from experiments.config.suggestions import did_you_mean
+from experiments.tracking import report_note
 from experiments.tracking.files import read_file
 from experiments.tracking.forms import is_deep, record_fault, study_fault
 from experiments.tracking.names import is_identity
@@ -25,6 +26,8 @@ from experiments.tracking.study import Study, StudyError, read_study
 from experiments.tracking.study_tables import table_changes
 from experiments.tracking.trees import flatten
 
+# What a report leaves, also where the study `paper` has not run; it uses no point.
+_REPORT = {"REPORT.md", "REPORT.html", report_note.NOTE}
 KINDS = ("points", "store", "diffs", "inference", "trash")  # folders of results but studies
 
 
@@ -267,10 +270,10 @@ def _inner_folders(folder: Path) -> tuple[list[Path], list[str]]:
 
 
 def _is_known(folder: Path) -> bool:
-    """Whether a folder of results that is no study uses no point: empty, or of a known kind."""
+    """Whether a folder of results that is no study uses no point: of a known kind, or a report."""
     if folder.name in KINDS or (folder / "points").is_dir():  # results in results
         return True
-    return not any(folder.iterdir())
+    return {path.name for path in folder.iterdir()} <= _REPORT
 
 
 def count_states(points: Iterable[Facts]) -> Counter[State]:

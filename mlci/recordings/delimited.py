@@ -26,6 +26,7 @@ SPACES = r"\s+"
 _LONG_LINE, _LONG_ENTRY = 10_000, 1000  # characters; numbers that are longer take very long
 _MOST_COLUMNS, _WIDE = 100_000, 1000  # a wide table is slow to read by column
 _LONG_UNIT = 20  # characters
+_FEW_ROWS = 0.1  # of the number of columns: a table of numbers with fewer rows is slow likewise
 _SEEN = 50  # lines by which delimiter and decimal sign are known
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -165,9 +166,11 @@ def table_of_lines(
         comma = any(map(_NO_THOUSAND.fullmatch, seen)) and not any("." in entry for entry in seen)
     if comma and delimiter == ",":
         texts, delimiter = [_INNER.join(split(text, ",")) for text in texts], _INNER
-    if len(names) > _WIDE:
+    if len(names) > _WIDE or len(rows) < _FEW_ROWS * len(names):
         frame = _by_row(texts, delimiter, comma)
     else:
+        frame = pd.DataFrame()
+    if len(names) <= _WIDE and (frame.empty or any(it.kind == "O" for it in frame.dtypes)):
         frame = _by_column(texts, delimiter, comma, len(names))
     if len(frame) != len(rows):
         raise Unusable(f"has {len(rows)} lines of samples, but {len(frame)} rows: quotes?")

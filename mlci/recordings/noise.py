@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # loads scipy.ndimage when it is first used
+from numpy.lib.stride_tricks import sliding_window_view
 
 from mlci.spaces import Floats
 from mlci.systems import System
@@ -75,8 +75,9 @@ def spikes(system: System, path: Floats, time: Floats) -> list[Spike]:
     """
     if len(path) < 2 * _REACH + 1:
         return []
-    window = (2 * _REACH + 1, 1)
-    middle = scipy.ndimage.median_filter(path, size=window, mode="nearest")
+    longer = np.pad(path, ((_REACH, _REACH), (0, 0)), mode="edge")
+    windows = sliding_window_view(longer, 2 * _REACH + 1, axis=0)
+    middle = np.partition(windows, _REACH)[..., _REACH]  # the median
     away = np.abs(path - middle)
     fastest = np.zeros(path.shape[1])
     for control in system.control_box.vertices():

@@ -504,6 +504,20 @@ def test_help_fits_the_terminal_and_its_examples_can_be_typed(
         assert parser.parse_args(shlex.split(example)).command
 
 
+def test_clean_passes_over_a_report_of_studies_that_have_not_run(
+    settings: Settings, tmp_path: Path, look
+) -> None:
+    swept(settings, tmp_path, "s")
+    (tmp_path / "paper").mkdir()
+    for name in ("REPORT.md", "REPORT.html", "report.json"):
+        (tmp_path / "paper" / name).write_text("{}")
+    assert look("clean") == (0, "nothing to clean\n", "")
+    (tmp_path / "paper" / "mine").touch()
+    status, _, err = look("clean")
+    assert status == 2
+    assert "paper: has no study.json" in err
+
+
 @pytest.mark.parametrize("harm", ["renamed", "link", "file"])
 def test_clean_fails_closed(harm: str, settings: Settings, tmp_path: Path, look) -> None:
     swept(settings, tmp_path, "s")

@@ -24,9 +24,10 @@ def test_hypotheses_have_the_colour_of_their_gain_and_the_first_their_rank() -> 
     axes = inference.plot(paths)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("angle [rad]", "speed [rad/s]")
     assert axes.get_xlim() == pytest.approx((0, 2 * np.pi))
-    patches = {
-        (round(p.get_x(), 6), round(p.get_y(), 6)): to_hex(p.get_facecolor()) for p in axes.patches
-    }
+    shapes, _ = axes.collections
+    corners = [path.get_extents().min.round(6).tolist() for path in shapes.get_paths()]
+    colours = [to_hex(colour) for colour in shapes.get_facecolor()]
+    patches = {tuple(corner): colour for corner, colour in zip(corners, colours, strict=True)}
     assert len(patches) == len(REGIONS)
     shades = {}
     for i, corner in enumerate(REGIONS.lower.round(6).tolist()):
@@ -38,14 +39,14 @@ def test_hypotheses_have_the_colour_of_their_gain_and_the_first_their_rank() -> 
     ranks = sorted(float(text.get_text()) for text in axes.texts)
     first = inference.ranking.rank[inference.gain > 0]
     assert ranks == sorted(first[first <= TOP].tolist())
-    ends = [line for line in axes.lines if line.get_marker() == "s"]
-    assert len(ends) == 3
+    (ends,) = [line for line in axes.lines if line.get_marker() == "s"]
+    assert len(ends.get_xdata()) == 3
 
 
 def test_a_region_across_the_seam_is_drawn_on_both_sides() -> None:
     across = Regions(CIRCLE, [[-0.5, 0.0]], [[0.5, 1.0]])
     axes = answer_of(across, ["a", "b"])[0].inference.plot()
-    left = sorted(patch.get_x() for patch in axes.patches)
+    left = sorted(path.get_extents().x0 for path in axes.collections[0].get_paths())
     np.testing.assert_allclose(left, [0.0, 2 * np.pi - 0.5])
 
 
