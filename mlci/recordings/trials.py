@@ -89,11 +89,12 @@ def _keys(
     """
     if group_by:
         return _texts(recording.frame, group_by), group_by
-    if len(_parts(recording.frame, fewest=3)) == 1:
+    columns = recording.table.columns
+    if recording.table.header and len(_parts(recording.frame, fewest=3)) == 1:
         known = {plain_name(name) for name in TRIALS}
-        named = [name for name in _id_columns(recording) if plain_name(name) in known]
-        if named:
-            return _texts(recording.table.columns, named), named
+        named = [name for name in columns.columns if plain_name(str(name)) in known]
+        if named := _id_columns(recording, named):
+            return _texts(columns, named), named
     return None, ()
 
 
@@ -160,11 +161,11 @@ def _naming_column(recording: Recording, parts: Sequence[pd.DataFrame]) -> str |
     return None
 
 
-def _id_columns(recording: Recording) -> list[str]:
-    """Columns of the file within whose values time rises."""
+def _id_columns(recording: Recording, names: Sequence[str] | None = None) -> list[str]:
+    """Columns of the file, or those of some names, within whose values time rises."""
     columns, time = recording.table.columns, recording.frame["time"]
     found = []
-    for name in pd.unique(columns.columns):
+    for name in pd.unique(columns.columns if names is None else pd.Index(names)):
         values = columns[name]
         if isinstance(values, pd.DataFrame) or not _is_whole(values):
             continue
