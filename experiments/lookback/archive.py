@@ -184,8 +184,8 @@ class Archive:
             return [], []
         folders, problems = _inner_folders(self.results / "points")
         strange = [f"{it}: is no point" for it in folders if not is_identity(it.name)]
-        files = [it for it in (self.results / "points").glob("[!.]*") if it.is_file()]
-        strange += [f"{it}: is a file, and no point" for it in files]
+        others = [it for it in (self.results / "points").glob("[!.]*") if not it.is_dir()]
+        strange += [f"{it}: is no folder, and no point" for it in others if not it.is_symlink()]
         return [it for it in folders if is_identity(it.name)], problems + strange
 
     @cached_property

@@ -41,7 +41,7 @@ def concerns(folder: Path) -> list[str] | None:
     try:
         note = _read_note(folder)
     except FileNotFoundError:
-        return None
+        return [f"{NOTE} is missing"] if (folder / "REPORT.md").exists() else None
     except (OSError, ValueError) as error:
         return [f"{NOTE} cannot be read ({error})"]
     changes = [file_change(folder / name, it, "written") for name, it in note["files"].items()]

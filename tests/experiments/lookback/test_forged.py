@@ -158,3 +158,13 @@ def test_a_full_output_is_told(
         monkeypatch.setattr(sys, "stdout", full)
         assert results.main() == 2
     assert capsys.readouterr().err == "No space left on device\n"
+
+
+def test_what_is_in_the_place_of_a_point_or_without_its_note_is_told(
+    point: Point, tmp_path: Path
+) -> None:
+    pipe = tmp_path / "results" / "points" / ("0" * 32)
+    os.mkfifo(pipe)
+    assert f"{pipe}: is no folder, and no point" in tell(tmp_path, "list points")[1]
+    (tmp_path / "results" / "s" / "REPORT.md").write_text("")
+    assert "report  not up to date: report.json is missing" in tell(tmp_path, "status")[1]
