@@ -140,3 +140,10 @@ def test_probabilities_that_differ_by_rounding_are_taken_in_order() -> None:
     for last in (0.5, 0.5 + 2e-16, 0.5 - 2e-16):
         areas = credible_set(apart, np.array([0.5, last]), 0.0, 1.0).areas
         assert [area.regions.tolist() for area in areas] == [[0], [1]]
+
+
+def test_a_hull_is_free_where_its_regions_are() -> None:
+    """In an angle too, which has no first end to count turns from."""
+    bands = Regions.from_grid(SPACE, (None, 4))
+    hull = area_of(bands.select(np.array([False, True, True, False])))
+    np.testing.assert_array_equal([hull.lower, hull.upper], [[-np.inf, 1], [np.inf, 3]])

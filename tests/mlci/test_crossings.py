@@ -121,3 +121,9 @@ def test_a_side_at_the_border_of_the_space_has_no_depth():
 def test_what_no_crossing_can_be_is_refused(values, message):
     with pytest.raises(ValueError, match=message):
         Crossing(*values)
+
+
+def test_a_crossing_of_just_the_depth_that_is_asked_for_counts():
+    path = np.array([[0.5, 0.0], [1.25, 0.0], [1.25, 0.5], [0.5, 0.5]])
+    assert stays(SQUARE, path, np.arange(4.0)).depth.tolist() == [0.25]
+    assert crossed(SQUARE, [path], [np.arange(4.0)], Crossing(depth=0.25)).all()

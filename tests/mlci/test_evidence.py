@@ -113,6 +113,8 @@ def test_errors_name_the_fault() -> None:
         posterior(np.zeros(2), prior_none=0.0)
     with pytest.raises(ValueError, match="weights >= 0"):
         posterior(np.zeros(2), prior=[1.0, -1.0])
+    with pytest.raises(ValueError, match="weights >= 0 that are not all 0"):
+        posterior(np.zeros(2), prior=[0.0, 0.0])
     with pytest.raises(ValueError, match=r"lies in \[0, 1\]"):
         confidence(1.5, [])
 

@@ -158,3 +158,11 @@ def test_nothing_to_fit_is_said() -> None:
         fit_map(np.ones((3, 2)), np.zeros((3, 2)), np.ones(3))
     with pytest.raises(ValueError, match=r"not \(3, 2\) and \(2, 2\)"):
         fit_map(np.ones((3, 2)), np.zeros((2, 2)), np.ones(2))
+
+
+def test_fifty_pairs_are_enough_for_a_curve_of_their_own() -> None:
+    alpha, crossed = drawn(CURVE, 50, 2)
+    alpha = np.minimum(alpha, 0.999)  # all within reach
+    for tasks, expected in ((50, [(0.01, 0.01), (0.09, 0.09)]), (49, [(0.01, 0.09)])):
+        fitted = fit_map(alpha[:tasks], crossed[:tasks], np.array([0.01, 0.09]))
+        assert [curve.sizes for curve in fitted.curves] == expected

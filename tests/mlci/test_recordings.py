@@ -313,3 +313,14 @@ def test_positions_alone_are_enough_where_a_velocity_is_derived(tmp_path):
     assert [str(note) for note in notes] == ["b: is a copy of a, and is not counted"]
     np.testing.assert_allclose(found[0].states[:, 1], 2 * np.cos(2 * times), atol=0.01)
     assert read_demonstrations(tmp_path, PENDULUM)[0] == []
+
+
+def test_a_goal_counts_in_a_line_that_lacks_a_state(tmp_path):
+    """The line is left out, as no state is known before; its goal is not."""
+    corners = [f"goal_{end}_{name}" for end in ("lower", "upper") for name in PENDULUM.space.names]
+    head = ",".join([HEADER.strip(), *corners])
+    (tmp_path / "a.csv").write_text(f"{head}\n0,,0,1,-1,2,1\n0.1,1,0,,,,\n0.2,1.1,0,,,,\n")
+    read = read_one(tmp_path / "a.csv")
+    assert len(read.states) == 2
+    assert read.task.goal.lower.tolist() == [1, -1]
+    assert read.task.goal.upper.tolist() == [2, 1]

@@ -66,3 +66,14 @@ def test_batches_are_neighbours_alike_in_order_and_as_many_as_fit(
     monkeypatch.setattr("mlci.task_batches._MOVES_AT_ONCE", 1)
     assert [len(batch) for batch in batches(every[:12])] == [1] * 12
     assert list(batches([])) == []
+
+
+@pytest.mark.parametrize("exact_ends", [False, True])
+def test_regions_block_by_block_have_the_same_bits(
+    monkeypatch: pytest.MonkeyPatch, model: TabularModel, exact_ends: bool
+) -> None:
+    able = [each for each in tasks(model, 2.5, exact_ends) if each.is_possible]
+    whole = avoidance_of_tasks(able)
+    assert len(np.unique(whole, axis=1).T) > 10
+    monkeypatch.setattr("mlci.task_batches.ALPHA_BYTES", 1)  # a region at a time
+    np.testing.assert_array_equal(avoidance_of_tasks(able), whole)

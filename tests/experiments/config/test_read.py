@@ -168,6 +168,7 @@ VALUES = [
     ("~dt", "dt: missing; give it a value"),
     ("dt=0", "dt: 0.0 must be above 0"),
     ("action_range=[[2,1]]", "action_range: [[2.0, 1.0]] must be 1 pairs, each of a lower and"),
+    ("action_range=[[1,1]]", "action_range: [[1.0, 1.0]] must be 1 pairs, each of a lower and"),
     ("action_range=[[-1,1],[-1,1]]", "action_range: [[-1.0, 1.0], [-1.0, 1.0]] must be 1 pairs"),
     ("inference.rule_breaking=1", "inference.rule_breaking: 1.0 must be below 1"),
     ("inference.rule_breaking=guess", "inference.rule_breaking: 'guess' is not a finite number"),
@@ -312,6 +313,12 @@ def test_a_hypothesis_or_nothing_can_be_the_truth() -> None:
     assert len(nothing.constraint) == 0
     one, other = identity("truth=cell", "truth.cell=1"), identity("truth=cell", "truth.cell=2")
     assert one != other
+
+
+def test_a_box_of_an_angle_may_go_across_the_seam() -> None:
+    boxes = "[{lower: ['9/5 pi', 0], upper: ['11/5 pi', 1.2]}]"
+    settings, _ = read_config(composed(f"truth.boxes={boxes}"))
+    assert np.flatnonzero(settings.candidates.inside(settings.constraint)).tolist() == [5, 95]
 
 
 def test_tasks_cannot_cross_what_is_not_there(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from hand_made import hand_made
 
+from experiments.collate.join import collate
 from experiments.lookback.archive import Archive, ArchiveError, Facts, value_of
 from experiments.tracking.points import Point, State
 from experiments.tracking.study import Study, write_plan
@@ -85,3 +88,17 @@ def test_facts_of_a_finished_point(points: list[Point]) -> None:
 def test_values_are_read_as_yaml_spells_them(text: str, value: object) -> None:
     assert value_of(text) == value
     assert type(value_of(text)) is type(value)
+
+
+def test_points_are_shipped_where_some_table_of_theirs_is_there(tmp_path: Path) -> None:
+    tables = {"trials": pd.DataFrame({"trial": [0], "error": [0.5]})}
+    point = hand_made(tmp_path, tables)
+    write_plan(tmp_path / "some", [(point, ["any"])])
+    collate([point], tmp_path / "some")
+    shutil.rmtree(tmp_path / "points")
+    assert Archive(tmp_path).point(point.identity).state is State.SHIPPED
+    (tmp_path / "some" / "tables" / "trials.csv").unlink()
+    assert Archive(tmp_path).point(point.identity).state is State.SHIPPED
+    for path in (tmp_path / "some" / "tables").iterdir():
+        path.unlink()
+    assert Archive(tmp_path).point(point.identity).state is State.MISSING

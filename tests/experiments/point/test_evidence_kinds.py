@@ -11,6 +11,7 @@ from tiny_point import TINY, composed
 
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
+from experiments.point import evidence_kinds
 from experiments.point.evidence_kinds import evidence_table
 from experiments.point.inference import PointInference, infer_point
 from experiments.tracking.store import Store
@@ -103,3 +104,46 @@ def test_a_world_has_no_sets_that_are_larger_than_it(
     nothing = evidence_table(settings, one, point.calibration)
     assert nothing.empty
     assert list(nothing.columns) == list(table.columns)
+
+
+def test_the_prior_is_that_of_what_is_true(settings: Settings, point: PointInference) -> None:
+    """Of a hypothesis or of nothing, which are as probable as each other at one prior only."""
+    assert point.calibration is not None
+    inference = dataclasses.replace(point.inference, prior_none=0.3)
+    point = dataclasses.replace(point, inference=inference)
+    assert evidence_table(settings, point, point.calibration)["prior"].unique() == pytest.approx(
+        0.7 / 10
+    )
+    truth = dataclasses.replace(settings.truth, cell=None)
+    nothing = evidence_table(
+        dataclasses.replace(settings, truth=truth), point, point.calibration
+    ).query("evidence == 'exact ends'")
+    assert nothing["prior"].unique() == pytest.approx(0.3)
+    assert nothing["top"].isna().all()
+    for _, row in nothing.iterrows():
+        count, number = row["demonstrations"], row["set"]
+        part = dataclasses.replace(inference, rates=PAPER, calibration=None).of(
+            slice(count * number, count * (number + 1))
+        )
+        assert row["of_truth"] == pytest.approx(part.posterior_none)
+        assert row["right"] == 0
+
+
+def test_a_rank_of_just_the_last_place_is_in_the_top(
+    settings: Settings, point: PointInference, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Hypothesis 6 is the seventh where evidence falls with the number."""
+    assert point.calibration is not None
+    shape = point.inference.violated.shape
+    by_hand = dataclasses.replace(
+        point.inference,
+        avoidance=np.broadcast_to(np.linspace(0.1, 0.9, shape[1]), shape),
+        violated=np.zeros(shape, dtype=bool),
+        rates=PAPER,
+        calibration=None,
+    )
+    monkeypatch.setattr(evidence_kinds, "_kinds", lambda *_: {"by hand": by_hand})
+    for top, is_in in ((7, 1), (6, 0)):
+        ranks = dataclasses.replace(settings.ranks, top=top)
+        changed = dataclasses.replace(settings, ranks=ranks)
+        assert set(evidence_table(changed, point, point.calibration)["top"]) == {is_in}

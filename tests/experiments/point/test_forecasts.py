@@ -128,3 +128,24 @@ def test_recordings_are_calibrated_by_tasks_like_theirs(
     assert forecasts.recorded_calibration(settings, model, paths, store).map == first.map
     with pytest.raises(AssertionError, match="it is stored"):  # other tasks are not
         forecasts.recorded_calibration(settings, model, paths[:1], store)
+
+
+@pytest.mark.parametrize("word", ["crossing.time=0.1", "inference.exact_ends=false"])
+def test_another_way_to_infer_is_calibrated_anew(
+    word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = [word for word in TINY if word.split("=")[0] in ("dt", "actions", "grid.shape")]
+    words += ["demonstrations=x", "system=double_integrator", "hypotheses.shape=[10,null]"]
+    made: list[object] = []
+
+    def calibration_of(*_: object, **options: object) -> Calibration:
+        made.append(options)
+        return Calibration(200, 3)
+
+    monkeypatch.setattr(forecasts, "calibrate", calibration_of)
+    path = Demonstration.from_path(np.linspace([-1, 0], [1, 0], 201), 0.01)
+    for changes in ([], [word], []):
+        settings = read_recorded_config(composed(*words, *changes, name="infer"))
+        forecasts.recorded_calibration(settings, None, [path], Store(tmp_path))
+    assert len(made) == 2
+    assert made[0] != made[1]

@@ -184,3 +184,29 @@ def test_streams_differ_by_seed_purpose_and_index() -> None:
     ]
     assert len(set(draws)) == len(draws)
     assert stream(0, Purpose.SUBSETS, 0).random() == stream(0, Purpose.SUBSETS, 0).random()
+
+
+def test_measures_stand_with_their_demonstrations_in_any_order(
+    settings: Settings, measured: Measures, point: PointInference
+) -> None:
+    """Tasks of one duration are measured together; here those come after another."""
+    order = [2, 0, 1]
+    turned = dataclasses.replace(
+        point,
+        numbers=point.numbers[order],
+        demonstrations=tuple(point.demonstrations[j] for j in order),
+        inference=point.inference.of(order),
+    )
+    again = measure_point(dataclasses.replace(settings, rollouts=200, seed=3), turned)
+    for name in ("feasible", "phi", "final_state_error", "violation_distance", "violation_share"):
+        np.testing.assert_allclose(getattr(again, name), getattr(measured, name)[order], atol=1e-12)
+    assert list(again.trajectories) == [4, 7]
+
+
+def test_no_step_of_the_integrator_is_longer_than_asked_for() -> None:
+    made = [Demonstration.from_path(np.array([[0.3, 1.0]] * 2), 1.0, goal=Box.point([2.0, 0.5]))]
+    controls = np.ones((1, 1, 3, 1))
+    half, longer, whole = (
+        rollout_errors(Pendulum(), made, controls, 1.0, step) for step in (0.5, 0.6, 1.0)
+    )
+    assert half == longer != whole

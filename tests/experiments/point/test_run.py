@@ -134,3 +134,14 @@ def test_no_more_demonstrations_than_asked_for(settings: Settings, tmp_path: Pat
         few = dataclasses.replace(settings.demonstrations, keep=keep)
         one = dataclasses.replace(settings, demonstrations=few)
         assert len(run_point(one, Store(tmp_path), lambda line: None)["trials"]) == keep
+
+
+def test_the_rank_after_some_demonstrations_is_that_of_no_more(
+    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.point.tables.PAPER_SIZE", 1)
+    made = run_point(settings, Store(tmp_path), lambda line: None)
+    ranks, (row,) = made["ranks"], made["summary"].to_dict("records")
+    after = ranks[ranks["demonstrations"] == 1]
+    assert len(after) < len(ranks)
+    assert row["rank_after_1"] == after["rank"].median() != ranks["rank"].median()

@@ -17,6 +17,8 @@ from experiments.point import stages, trials
 from experiments.point.run import run_point
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.store import Store
+from mlci.constant_controls import tabulate_escapes
+from mlci.grids import Grid
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import EULER, RK4, rollout
 from mlci.systems import Pendulum
@@ -159,3 +161,16 @@ def test_damaged_model_is_computed_again(tmp_path: Path, caplog: pytest.LogCaptu
     with caplog.at_level(logging.WARNING):
         assert_equal(stages.tabular_model(settings, Store(tmp_path)), before)
     assert "damaged and is computed again" in caplog.text
+
+
+def test_a_safe_set_from_constant_controls_lasts_for_the_horizon(tmp_path: Path) -> None:
+    words = ["safety.method=escapes", "safety.shape=[9,9]"]
+    made = []
+    for horizon in (5.0, 0.5):
+        settings = composed(*words, f"horizon={horizon}")
+        grid, truth = Grid(settings.model.space, (9, 9)), settings.constraint
+        safe, _ = stages.safe_set(settings, Store(tmp_path))
+        direct = tabulate_escapes(settings.model, grid, truth, horizon=horizon)
+        np.testing.assert_array_equal(safe.values, direct.values)
+        made.append(safe.values)
+    assert not np.array_equal(*made)

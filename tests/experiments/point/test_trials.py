@@ -162,3 +162,13 @@ def test_rules_need_a_truth() -> None:
 def test_arguments_that_change_nothing_are_no_other_reality() -> None:
     plain, same = settings_of(), settings_of("reality.system={length: 1, drag: 0}")
     assert same == plain
+
+
+def test_tasks_are_drawn_anew_until_enough_cross_the_truth(tmp_path: Path) -> None:
+    words = [*(word for word in TINY if ".keep" not in word), "demonstrations.keep=6"]
+    settings, of_any_task = settings_of(*words, "tasks.crossing=true"), settings_of(*words)
+    starts, first = (
+        trials.demonstrations(each, Store(tmp_path)).starts for each in (settings, of_any_task)
+    )
+    assert len(np.unique(starts, axis=0)) == len(starts) == 6
+    assert not np.all(np.isin(starts, first))

@@ -170,3 +170,19 @@ def test_point_that_another_sweep_runs_is_waited_for(
     ends = {"a": "" if end else "done", "b": "done"}
     assert run(points, **ends) == (launched, failures, [])
     assert capsys.readouterr().out == "waiting for 1 point that another process runs: a\n"
+
+
+def test_a_failed_point_is_tried_again_before_others_are_waited_for(
+    points: list[PlannedPoint], meanwhile: Callable[..., None]
+) -> None:
+    lock, seen = points[1].point.lock, list[int]()
+    lock.acquire()
+
+    def finish() -> None:
+        seen.append(points[0].point.attempts())
+        write(points[1].point, "record", 1)
+        lock.release()
+
+    meanwhile(finish)
+    launched, failures, _ = run(points, retries=1, a="raised done", b="elsewhere", c="done")
+    assert (launched, failures, seen) == (["a b c", "a"], {}, [2])

@@ -177,3 +177,11 @@ def test_a_queue_that_never_answers_is_given_up(
     ]
     late = ["scancel does not answer; cancel by hand: scancel 7"] * ("sleep" in code)
     assert lines[2:] == late
+
+
+def test_a_job_that_is_absent_for_a_moment_has_not_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has where it is absent at three looks in a row; no answer is no look."""
+    looks = iter([{"7_0"}, set(), set(), {"7_0"}, set(), set(), None, set()])
+    monkeypatch.setattr(slurm, "_queue", lambda ids: next(looks))
+    slurm.SlurmLauncher(1, 0.0, False, cpus_per_task=1)._wait(["7_0"])
+    assert list(looks) == []

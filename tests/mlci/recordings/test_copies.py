@@ -35,3 +35,14 @@ def test_copies_count_once() -> None:
 
 def test_none_of_none() -> None:
     assert distinct([], SPACE) == ([], [])
+
+
+def test_times_of_copies_agree_to_a_share_of_the_duration() -> None:
+    """A millionth of 1000 s is a thousandth of a second."""
+    long = 1000 * TIME
+    rounded, other = (np.append(0.0, long[1:] + by) for by in (5e-4, 2e-3))
+    kept, copies = distinct(
+        [named("a", time=long), named("rounded", time=rounded), named("other", time=other)], SPACE
+    )
+    assert [each.name for each in kept] == ["a", "other"]
+    assert copies == [("rounded", "a")]

@@ -74,3 +74,21 @@ def test_what_is_no_path_at_all_is_refused() -> None:
     table.loc[1::2, "angular_velocity"] = np.nan
     with pytest.raises(ValueError, match="no row has a number for each of"):
         bridged(table)
+
+
+def test_no_gap_is_bridged_where_none_may_be() -> None:
+    """Not even in a dimension that stands still."""
+    table = frame(0.0)
+    table.loc[25, "angle"] = np.nan
+    with pytest.raises(ValueError, match=r"line 27: angle is missing for 0\.02 s"):
+        bridged(table, 0.0)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_the_speed_on_either_side_of_one_missing_sample_counts(way: int) -> None:
+    """It moves on one side and stands still on the other."""
+    table = frame()
+    table["angle"] = (1 + np.minimum(table["time"], 0.49)).to_numpy()[::way]
+    table.loc[50, "angle"] = np.nan
+    with pytest.raises(ValueError, match=r"may move by 0\.02 rad"):
+        bridged(table, 0.05)
