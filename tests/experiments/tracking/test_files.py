@@ -138,7 +138,7 @@ def test_there_is_one_way_to_write_a_file() -> None:
         path.relative_to(root).as_posix(): line.strip()
         for path in paths
         for line in path.read_text(encoding="utf-8").splitlines()
-        if _WRITES.search(line)
+        if _WRITES.search(line) and "os.devnull" not in line
     }
     assert found.pop("experiments/tracking/files.py", None)
     assert set(found) <= _OTHERS, found
