@@ -16,7 +16,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-import pandas as pd
 
 import mlci.preparation
 from experiments.app import DONE, FAILED, run_command
@@ -28,6 +27,7 @@ from experiments.page.document import page
 from experiments.point.forecasts import recorded_calibration
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import plausibilities, read_recordings, together
+from experiments.point.recorded_tables import demonstration_tables, path_table
 from experiments.progress import begin, steps_shown
 from experiments.terminal import complain, counted, entry
 from experiments.tracking.environment import environment
@@ -88,6 +88,37 @@ def infer(settings: RecordedSettings) -> int:
     if settings.inference.calibrate:
         store = Store(results / "store")
         calibration = recorded_calibration(settings, model, demonstrations, store)
+    result = _answer(settings, model, demonstrations, calibration, summary(checks))
+    begin("drawing the map")
+    # All is saved before it is printed, in case nobody reads on.
+    folder = _save(settings, demonstrations, problems, result, checks)
+    diagnosis, count = diagnose(model), len(demonstrations)
+    unreachable = int(np.sum(~result.inference.reachable))
+    doubtful = [check for check in checks if check.doubts]
+    concerns = list(diagnosis.concerns(space.names, unreachable, count))
+    content = _page(settings, readings, result, calibration, doubtful, concerns)
+    replace_file(folder / "page.html", content)
+    begin("")
+    for line in (
+        *_answer_lines(settings, result, calibration),
+        f"demonstrations  {count} used, {counted(len(problems), 'file')} not used",
+        *_refutation_lines(result.inference),
+        *diagnosis_lines(diagnosis, space.names, unreachable, count),
+        f"written: {shown_path(folder)}",
+        f"page: {shown_path(folder / 'page.html')}",
+    ):
+        print(line)
+    return FAILED if problems else DONE
+
+
+def _answer(
+    settings: RecordedSettings,
+    model: TabularModel,
+    demonstrations: Sequence[Demonstration],
+    calibration: Calibration | None,
+    doubts: Sequence[str],
+) -> Answer:
+    """The inference, seen from all sides."""
     begin(f"ranking {len(settings.candidates)} hypotheses")
     forecast_map = None if calibration is None else calibration.map
     exact_ends = settings.inference.exact_ends
@@ -109,42 +140,27 @@ def infer(settings: RecordedSettings) -> int:
         temperature = estimate_temperature(
             model, demonstrations, inference, round_horizon=True, exact_ends=exact_ends
         )
-    ranking = ranking_table(inference)
-    result = answer(
+    return answer(
         model,
         demonstrations,
         inference,
         round_horizon=True,
         exact_ends=exact_ends,
         temperature=temperature,
-        doubts=summary(checks),
+        doubts=doubts,
     )
-    begin("")
-    for line in answer_lines(result, settings.top):
-        print(line)
+
+
+def _answer_lines(
+    settings: RecordedSettings, result: Answer, calibration: Calibration | None
+) -> list[str]:
+    """The answer, where to read on if it is doubtful, and how forecasts were calibrated."""
+    lines = list(answer_lines(result, settings.top))
     if np.any(result.misfit.is_rare):
-        for line in entry("see", ON_WRONG_MODELS):
-            print(line)
+        lines += entry("see", ON_WRONG_MODELS)
     if calibration is not None:
-        for line in entry("calibration", calibration.summary()):
-            print(line)
-    print(f"demonstrations  {len(demonstrations)} used, {counted(len(problems), 'file')} not used")
-    for line in _refutation_lines(inference):
-        print(line)
-    unreachable = int(np.sum(~inference.reachable))
-    diagnosis, count = diagnose(model), len(demonstrations)
-    for line in diagnosis_lines(diagnosis, space.names, unreachable, count):
-        print(line)
-    begin("drawing the map")
-    folder = _save(settings, demonstrations, problems, result, ranking, checks)
-    doubtful = [check for check in checks if check.doubts]
-    concerns = list(diagnosis.concerns(space.names, unreachable, count))
-    content = _page(settings, readings, result, calibration, doubtful, concerns)
-    replace_file(folder / "page.html", content)
-    begin("")
-    print(f"written: {shown_path(folder)}")
-    print(f"page: {shown_path(folder / 'page.html')}")
-    return FAILED if problems else DONE
+        lines += entry("calibration", calibration.summary())
+    return lines
 
 
 def _tabular_model(settings: RecordedSettings) -> TabularModel:
@@ -186,12 +202,11 @@ def _save(
     demonstrations: Sequence[Demonstration],
     problems: Sequence[Remark],
     result: Answer,
-    ranking: pd.DataFrame,
     checks: Sequence[Plausibility],
 ) -> Path:
     """Write tables, map and record into a folder of their own, named by what went in."""
     space, inference = settings.model.space, result.inference
-    paths = _path_table(demonstrations, space.names)
+    paths = path_table(demonstrations, space.names)
     # What decides the result: the settings that do, and the numbers that were read.
     made_from = {
         "config": {**plain(settings), "demonstrations": "", "results": None, "top": 0},
@@ -200,7 +215,10 @@ def _save(
     }
     results = results_folder(settings) / "inference"
     folder = results / digest(canonical_json(made_from))[:16]
-    tables = {"hypotheses": ranking, **_demonstration_tables(demonstrations, inference)}
+    tables = {
+        "hypotheses": ranking_table(inference),
+        **demonstration_tables(demonstrations, inference),
+    }
     for name, table in tables.items():
         replace_file(folder / f"{name}.csv", csv_bytes(table))
     replace_file(folder / "map.png", _map(inference, demonstrations))
@@ -253,37 +271,3 @@ def _page(
 def _json_bytes(tree: dict[str, Any]) -> bytes:
     """A tree as it is written to a file."""
     return json.dumps(tree, indent=1, allow_nan=False).encode() + b"\n"
-
-
-def _path_table(demonstrations: Sequence[Demonstration], names: Sequence[str]) -> pd.DataFrame:
-    """A row a sample of each demonstration."""
-    samples = np.concatenate([demonstration.states for demonstration in demonstrations])
-    lengths = [len(demonstration.states) for demonstration in demonstrations]
-    of = np.repeat([demonstration.name for demonstration in demonstrations], lengths)
-    return pd.DataFrame({"demonstration": of, **dict(zip(names, samples.T, strict=True))})
-
-
-def _demonstration_tables(
-    demonstrations: Sequence[Demonstration], inference: Inference
-) -> dict[str, pd.DataFrame]:
-    """What each demonstration is, and what it says of each hypothesis."""
-    count, names = len(inference.hypotheses), list(inference.names)
-    phi = np.where(inference.reachable[:, None], inference.phi, np.nan)
-    return {
-        "demonstrations": pd.DataFrame(
-            {
-                "demonstration": names,
-                "duration": [demonstration.task.horizon for demonstration in demonstrations],
-                "reachable": inference.reachable,
-                "violated": np.sum(inference.violated, axis=1),
-            }
-        ),
-        "violations": pd.DataFrame(
-            {
-                "demonstration": np.repeat(names, count),
-                "hypothesis": np.tile(np.arange(count), len(names)),
-                "probability": phi.ravel(),
-                "violated": inference.violated.ravel(),
-            }
-        ),
-    }

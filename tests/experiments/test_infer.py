@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,20 @@ def test_durations_that_dt_does_not_divide(recorded: Path) -> None:
     (line,) = done.stderr.splitlines()
     assert line.startswith("note: trial_0")
     assert line.endswith("more: its 5 s count as 17 steps of 0.3 s, 5.1 s")
+
+
+def test_an_answer_that_nobody_reads_on_is_saved(recorded: Path) -> None:
+    words = ["demonstrations=recorded", "results=results", "inference.calibrate=false"]
+    script = Path(command.__file__)
+    done = subprocess.run(
+        f"{sys.executable} {script} {' '.join(words)} grid=100 dt=0.5 | head -c 1",
+        shell=True,
+        cwd=recorded,
+        capture_output=True,
+        timeout=60,
+    )
+    assert not done.stderr
+    assert {file.name for file in saved(recorded).iterdir()} >= {"answer.json", "page.html"}
 
 
 def test_the_same_states_at_other_times_are_another_result(recorded: Path) -> None:
