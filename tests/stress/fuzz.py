@@ -268,7 +268,8 @@ def attempt(case: Case, folder: Path, separate: bool) -> str | None:
     status, out, err = (_as_command if separate else _in_process)(script, words, folder)
     if sorted(folder.rglob("*")) != before:
         return f"wrote {sorted(set(folder.rglob('*')) - set(before))}"
-    if status != app.REFUSED:
+    # A path that stands for no recording is told like a recording that cannot be used.
+    if status not in ({app.REFUSED, app.FAILED} if case.command == "infer" else {app.REFUSED}):
         return f"exit status {status}: {err[-300:]!r}"
     if "Traceback" in err + out:
         return f"traceback: {err[-600:]}"
