@@ -62,11 +62,12 @@ def command_words(words: Sequence[str]) -> list[str]:
 def quote_path(argument: str) -> str:
     """demonstrations=rec (1) as demonstrations='rec (1)': a path is text, without a grammar.
 
-    A list of paths, what is quoted, and an interpolation stay as they are.
+    A list of paths, what is quoted, and an interpolation stay as they are; so does `results=a,b`,
+    which asks for two folders at once, and is refused.
     """
     key, _, value = argument.partition("=")
     as_it_is = re.match(r"""null$|["']|\[.*\]$|\$\{""", value, re.DOTALL)
-    if key not in PATHS or not value or as_it_is:
+    if key not in PATHS or not value or as_it_is or (key == "results" and "," in value):
         return argument
     # Hydra's grammar: before a quote, or at the end, backslashes are doubled.
     escaped = re.sub(r"(\\*)'", r"\1\1\\'", value)

@@ -219,7 +219,8 @@ def cases(random_: random.Random) -> Iterator[Case]:
         "[1,2]",
         "null",
     ):
-        yield Case("infer", (f"demonstrations={value}",), ("demonstrations", "nothing"))
+        named = ("demonstrations", "no such file")
+        yield Case("infer", (f"demonstrations={value}",), named)
     for key in (
         "recorded_dt",
         "top",

@@ -34,7 +34,8 @@ def parsed(word: str) -> object:
 @pytest.mark.parametrize("path", TEXTS)
 def test_a_path_is_text(path: str) -> None:
     assert parsed(quote_path(f"demonstrations={path}")) == path
-    assert parsed(quote_path(f"results={path}")) == path
+    if "," not in path:
+        assert parsed(quote_path(f"results={path}")) == path
 
 
 @given(
@@ -52,6 +53,7 @@ def test_any_text_without_quotes_is_kept(path: str) -> None:
         "demonstrations='a b'",
         'results="a b"',
         "results=null",
+        "results=a,b",  # two folders at once, which a sweep refuses
         "results=",
         "demonstrations=${results}",
         "dt=0.5",
