@@ -23,7 +23,7 @@ COMMANDS = {
 }
 
 
-@pytest.mark.parametrize("delay", [0.0, pytest.param(0.1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("delay", [0.0, pytest.param(0.03, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", COMMANDS)
 def test_ctrl_c_while_modules_are_imported_ends_a_command_quietly(
     name: str, delay: float, tmp_path: Path
