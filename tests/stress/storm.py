@@ -289,8 +289,8 @@ def overhead(base: Path, limit: float = 1.0) -> None:
     assert each < limit
 
 
-def collating(base: Path, limit: float = 12.0) -> None:
-    """CPU time of collating 2000 points, with a tiny point's tables; machines differ twofold."""
+def collating(base: Path, limit: float = 6.0) -> None:
+    """CPU time of collating 1000 points, with a tiny point's tables; machines differ twofold."""
     register_plugins()
     with initialize_config_dir(str(CONF), **version_base()):
         settings = read_config(plain_tree(compose("config", ["scale=smoke"])))[0]
@@ -298,7 +298,7 @@ def collating(base: Path, limit: float = 12.0) -> None:
         settings, Store(base / "store"), lambda line: None
     )
     experiments.point.run.run_point = lambda *_: tables_of_one
-    seeded = [dataclasses.replace(settings, seed=seed) for seed in range(2000)]
+    seeded = [dataclasses.replace(settings, seed=seed) for seed in range(1000)]
     points = [Point.planned(plain(each), base / "collated") for each in seeded]
     for point, each in zip(points, seeded, strict=True):
         attempt.run_here(point, each, lambda line: None)
@@ -306,7 +306,7 @@ def collating(base: Path, limit: float = 12.0) -> None:
     began = time.process_time()
     collate(points, base / "collated" / "s")
     spent = time.process_time() - began
-    print(f"collating: {spent:.2f} s for 2000 points of {size / 1000:.0f} kB")
+    print(f"collating: {spent:.2f} s for 1000 points of {size / 1000:.0f} kB")
     assert spent < limit
 
 
