@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, TypeVar
 
+import omegaconf
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from omegaconf.resolvers import oc
@@ -176,13 +177,17 @@ def resolved_tree(config: DictConfig) -> dict[str, Any]:
 
 def _resolved(config: DictConfig, variable: Callable[..., Any]) -> dict[str, Any]:
     """A config with every interpolation resolved, with a function for `oc.env`."""
-    OmegaConf.register_new_resolver("oc.env", variable, replace=True)
+    # OmegaConf 2.4, which Hydra 1.4 brings, swaps the names of the new and the old function.
+    older = omegaconf.__version__ < "2.4"
+    name = "register_new_resolver" if older else "register_resolver"
+    register: Callable[..., None] = getattr(OmegaConf, name)
+    register("oc.env", variable, replace=True)
     try:
         resolved: Any = OmegaConf.to_container(config, resolve=True)
     except OmegaConfBaseException as error:
         raise ConfigError(f"{error.full_key}: {str(error).splitlines()[0]}") from None
     finally:
-        OmegaConf.register_new_resolver("oc.env", oc.env, replace=True)
+        register("oc.env", oc.env, replace=True)
     return dict(resolved)
 
 
