@@ -17,6 +17,7 @@ import mlci
 from experiments.page.drawing import map_svg, plane_title
 from experiments.page.numbers import page_numbers
 from experiments.page.words import answer_sentences, next_sentences, sentences_of
+from experiments.terminal import counted
 from mlci.answers import Answer
 from mlci.demonstrations import Demonstration
 from mlci.planes import planes
@@ -65,7 +66,7 @@ def page(
         "policy": html.escape(_policy(style, script)),
         "title": html.escape(title),
         "about": f"<p>{html.escape(about)}</p>" if about else "",
-        "counts": f"{_counted(count, 'demonstration')}, {_counted(len(regions), 'region')}",
+        "counts": f"{counted(count, 'demonstration')}, {counted(len(regions), 'region')}",
         "headline": html.escape(headline),
         "answer": _paragraphs(sentences),
         "planes": "".join(
@@ -122,7 +123,7 @@ def _evidence(answer: Answer) -> list[str]:
         return []
     return [
         f"for regions of {_percent(curve.sizes)} of all states, chances of entering are calibrated "
-        f"by {_counted(curve.tasks, 'simulated task')}, so that one demonstration brings at most "
+        f"by {counted(curve.tasks, 'simulated task')}, so that one demonstration brings at most "
         f"{curve.largest_gain:.2f} nat"
         for curve in calibration.curves
     ]
@@ -143,8 +144,3 @@ def _items(sentences: Sequence[str]) -> str:
 def _paragraphs(sentences: Sequence[str]) -> str:
     """A paragraph a sentence, escaped."""
     return "".join(f"<p>{html.escape(each)}</p>" for each in sentences)
-
-
-def _counted(count: int, noun: str) -> str:
-    """A count with its noun."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"

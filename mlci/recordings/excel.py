@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mlci.recordings.table import Table, Unusable, Wants
+from mlci.recordings.table import Table, Unusable, Wants, refuse_large
 
 _COST = 20  # bytes of memory for one of the sheet's text
 _MOST_COLUMNS = 1000
@@ -33,8 +33,7 @@ def read(file: Path, _wants: Wants, limit: int) -> Table:
         raise Unusable("reading .xlsx needs openpyxl: pip install openpyxl") from None
     with zipfile.ZipFile(file) as archive:
         size = _COST * sum(entry.file_size for entry in archive.infolist())
-    if size > limit:
-        raise Unusable(f"takes {size:.2g} bytes, more than the {limit:.2g} of max_memory")
+    refuse_large(size, limit, "takes")
     book = openpyxl.load_workbook(file, read_only=True, data_only=True)
     try:
         sheet = book.worksheets[0]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mlci.recordings.arrays import table_of_arrays
-from mlci.recordings.table import Table, Unusable, Wants
+from mlci.recordings.table import Table, Unusable, Wants, refuse_large
 
 _HDF5 = b"\x89HDF"
 _COMPRESSED = 15  # type of a compressed element
@@ -46,8 +46,7 @@ def read(file: Path, wants: Wants, limit: int) -> Table:
         name, shape, kind = groups[0]
         raise Unusable(f"variable {name!r} is a {kind} {shape}: save a file, or a struct, a trial")
     size = 8 * sum(prod(shape) for shape, _ in used.values())
-    if size > limit:
-        raise Unusable(f"claims {size:.2g} bytes, more than the {limit:.2g} of max_memory")
+    refuse_large(size, limit)
     for name, (_, kind) in used.items():
         if not kind.startswith(("double", "single", "int", "uint", "logical", "char")):
             raise Unusable(f"variable {name!r} is a {kind}, not an array of numbers")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from mlci.recordings.arrays import table_of_arrays
-from mlci.recordings.table import Table, Unusable, Wants
+from mlci.recordings.table import Table, Unusable, Wants, refuse_large
 
 
 def read(file: Path, wants: Wants, limit: int) -> Table:
@@ -29,8 +29,7 @@ def read(file: Path, wants: Wants, limit: int) -> Table:
         names = [entry[:-4] for entry in archive.namelist() if entry.endswith(".npy")]
         used = {name: _header(archive, f"{name}.npy") for name in names if wants(name)}
         size = sum(prod(shape) * dtype.itemsize for shape, dtype in used.values())
-        if size > limit:
-            raise Unusable(f"claims {size:.2g} bytes, more than the {limit:.2g} of max_memory")
+        refuse_large(size, limit)
         arrays = {name: _array(archive, f"{name}.npy", used[name][0]) for name in used}
     return table_of_arrays(file, arrays, [name for name in names if name not in used])
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from mlci.recordings.arrays import table_of_arrays
-from mlci.recordings.table import Table, Unusable, Wants
+from mlci.recordings.table import Table, Unusable, Wants, refuse_large
 
 _LONG = 200  # characters of a name
 
@@ -39,8 +39,7 @@ def read(file: Path, wants: Wants, limit: int) -> Table:
         if twice := [name for name, count in Counter(used).items() if count > 1]:
             raise Unusable(f"has two columns {twice[0]!r}: rename or remove one")
         size = _claimed_bytes(source.metadata, set(used))
-        if size > limit:
-            raise Unusable(f"claims {size:.2g} bytes, more than the {limit:.2g} of max_memory")
+        refuse_large(size, limit)
         data = source.read(columns=used)
     arrays: dict[str, Any] = {}
     for name in used:

@@ -22,6 +22,21 @@ class NoRecording(Unusable):
     """What a file is that nobody takes for a recording, such as a text or metadata."""
 
 
+def refuse_large(size: float, limit: int, verb: str = "claims") -> None:
+    """Refuse what would take more memory than it may, before it is loaded.
+
+    Args:
+        size: of what is to be loaded [bytes].
+        limit: bytes that reading may take.
+        verb: how sure the size is.
+
+    Raises:
+        Unusable: a size above the limit.
+    """
+    if size > limit:
+        raise Unusable(f"{verb} {size:.2g} bytes, more than the {limit:.2g} of max_memory")
+
+
 @dataclass(frozen=True, eq=False)
 class Table:
     """The rows of a file, as they stand there.
