@@ -75,6 +75,7 @@ def spikes(system: System, path: Floats, time: Floats) -> list[Spike]:
     """
     if len(path) < 2 * _REACH + 1:
         return []
+    # The ends, repeated, are most of their own windows, so that no end is a spike.
     longer = np.pad(path, ((_REACH, _REACH), (0, 0)), mode="edge")
     windows = sliding_window_view(longer, 2 * _REACH + 1, axis=0)
     middle = np.partition(windows, _REACH)[..., _REACH]  # the median
@@ -91,8 +92,7 @@ def spikes(system: System, path: Floats, time: Floats) -> list[Spike]:
     runs = np.split(out, np.flatnonzero(np.diff(out) > 1) + 1) if len(out) else []
     found = []
     for run in runs:
-        if run[0] > 0 and run[-1] < len(path) - 1:
-            row = run[int(np.argmax(excess[run]))]
-            d = int(np.argmax(away[row] / np.where(limit > 0, limit, np.inf)))
-            found.append(Spike(int(run[0]), int(run[-1]), d, float(away[row, d])))
+        row = run[int(np.argmax(excess[run]))]
+        d = int(np.argmax(away[row] / np.where(limit > 0, limit, np.inf)))
+        found.append(Spike(int(run[0]), int(run[-1]), d, float(away[row, d])))
     return found

@@ -22,7 +22,7 @@ from mlci.preparation import infer
 WORLD = [
     *("system=double_integrator", "truth=cell", "truth.cell=6", "inference=calibrated"),
     *("demonstrations.pairs=12", "demonstrations.keep=8", "calibration.sets=1"),
-    *("calibration.demonstrations=[2,3]", "tasks.lower=[-1.0,-0.5]", "tasks.upper=[1.0,0.5]"),
+    *("calibration.demonstrations=[2,3]", "tasks.lower=[-2.0,-1.0]", "tasks.upper=[2.0,1.0]"),
 ]
 
 
@@ -71,6 +71,7 @@ def test_each_kind_is_an_inference(kind: str, table: pd.DataFrame, point: PointI
     sets = {count: len(point.demonstrations) // count for count in (2, 3)}
     assert min(sets.values()) >= 2
     assert len(rows) == sum(sets.values())
+    assert rows.loc[rows["demonstrations"] == 2, "best"].nunique() >= 2  # sets are told apart
     for _, row in rows.iterrows():
         count = row["demonstrations"]
         part = whole.of(slice(count * row["set"], count * (row["set"] + 1)))

@@ -312,6 +312,11 @@ def test_a_struct_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
     assert "unpacks to more than half of max_memory" in message(tmp_path / "a.mat", max_memory=10)
 
 
+def test_a_matrix_that_takes_much_as_floats_is_refused_before_it_is_loaded(tmp_path: Path) -> None:
+    savemat(tmp_path / "a.mat", {"time": np.zeros((1, 3 * 10**6), dtype=np.int8)})
+    assert "claims 2.4e+07 bytes, more than the 1e+07" in message(tmp_path / "a.mat", max_memory=10)
+
+
 def test_hidden_files_are_passed_over(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(HEADER + "0,1,0\n1,1,0\n")
     (tmp_path / "._a.csv").write_bytes(b"\x00\x05\x16\x07")

@@ -62,3 +62,11 @@ def test_a_path_that_jumps_and_stays_is_no_spike() -> None:
     path = SMOOTH.copy()
     path[150:] += [2.0, 0.0]
     assert spikes(SYSTEM, path, TIME) == []
+
+
+@pytest.mark.parametrize("row", [0, 300])
+def test_a_sample_at_an_end_does_not_jump_out_and_back(row: int) -> None:
+    """Where a path begins or ends elsewhere, its end may be what is right."""
+    path = SMOOTH.copy()
+    path[row] += [2.0, 0.0]
+    assert spikes(SYSTEM, path, TIME) == []
