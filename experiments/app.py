@@ -187,13 +187,13 @@ def _help(name: str) -> str:
 
 def _cannot_print(error: Exception) -> bool:
     """Whether nobody reads what is printed any more, or there is no room; the latter is told."""
+    from experiments.terminal import print_nowhere
+
     if not (isinstance(error, OSError) and error.errno in (errno.EPIPE, errno.ENOSPC)):
         return False
     if error.errno == errno.ENOSPC:
         print(f"{error}; what has finished is kept", file=sys.stderr)
-    # What is left to print has nowhere to go.
-    with open(os.devnull, "w") as nowhere:
-        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+    print_nowhere()
     return True
 
 

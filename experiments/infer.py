@@ -29,7 +29,7 @@ from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import plausibilities, read_recordings, together
 from experiments.point.recorded_tables import demonstration_tables, path_table
 from experiments.progress import begin, steps_shown
-from experiments.terminal import complain, counted, entry
+from experiments.terminal import complain, counted, entry, say
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.store import Store
@@ -80,8 +80,7 @@ def infer(settings: RecordedSettings) -> int:
         return FAILED
     results = writable_results(settings)
     checks = plausibilities(settings, demonstrations)
-    for line in _doubt_lines(checks):
-        print(line)
+    say(_doubt_lines(checks))
     begin("forming the tabular model")
     model = _tabular_model(settings)
     calibration = None

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TextIO
 
 WIDTH = 80  # columns of a terminal
@@ -56,6 +57,22 @@ def fitted(text: str, stream: TextIO) -> str:
 def complain(text: str) -> None:
     """Print what is wrong."""
     print(fitted(text, sys.stderr), file=sys.stderr)
+
+
+def say(lines: Iterable[str]) -> None:
+    """Print what is known before the work, which goes on where nobody reads."""
+    try:
+        for line in lines:
+            print(line)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        print_nowhere()
+
+
+def print_nowhere() -> None:
+    """Drop what is printed from now on, as nobody reads it or there is no room for it."""
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def terminal_width() -> int | None:

@@ -44,7 +44,7 @@ def study_fault(study: Study) -> str | None:
         kinds |= {
             **{
                 name: _is_texts(getattr(collated, name))
-                for name in ("systems", "commits", "versions", "kept", "machines", "started")
+                for name in ("systems", "commits", "versions", "kept", "machines")
             },
             "started": _is_texts(collated.started) and len(collated.started) == 2,
             "sources": isinstance(collated.sources, Mapping)
