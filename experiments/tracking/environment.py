@@ -26,6 +26,7 @@ _PACKAGES = (
     "mlci",
     "numpy",
     "scipy",
+    "numba",
     "pandas",
     "hydra-core",
     "omegaconf",
