@@ -26,7 +26,6 @@ from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.diagnosis import MOST_UNREACHABLE, Diagnosis, diagnose
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
-from mlci.recursions import reachable_cells
 from mlci.spaces import Bools
 from mlci.tabular import discretize
 
@@ -223,18 +222,8 @@ def _try(
         settings.model, grid, settings.action_values, dt, settings.candidates, samples
     )
     formed = time.process_time() - before
-    merged, distributions = (
-        model.merged,
-        [TrajectoryDistribution.of_task(model, task) for task in tasks],
-    )
-    reached = np.array(
-        [
-            np.isin(
-                each.goal, reachable_cells(merged, np.array([each.start]), each.steps)[-1]
-            ).any()
-            for each in distributions
-        ]
-    )
+    distributions = [TrajectoryDistribution.of_task(model, task) for task in tasks]
+    reached = np.array([each.reachable[-1, each.goal].any() for each in distributions])
     task_s = np.nan
     if reached.any():
         first = distributions[int(np.argmax(reached))]

@@ -8,64 +8,42 @@ cell would seem unavoidable, although the demonstration begins and ends outside 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
+from mlci.merged_moves import MergedMoves
 from mlci.simulate import rollout
-from mlci.spaces import Bools, Box, Floats, Ints
+from mlci.spaces import Box, Floats, Ints
 from mlci.tabular import TabularModel, follow
 
 
-@dataclass(frozen=True, eq=False)
-class EndMoves:
-    """L moves that may be taken, at one end of a trajectory.
-
-    Attributes:
-        cell: (L,) cell in which a move begins.
-        successor: (L,) cell in which it ends.
-        reward: (L,) its reward [nat].
-        crosses: (L, C) which regions it enters.
-    """
-
-    cell: Ints
-    successor: Ints
-    reward: Floats
-    crosses: Bools
-
-    def scaled(self, factor: float) -> EndMoves:
-        """The same with rewards times a factor, as at another temperature."""
-        return replace(self, reward=self.reward * factor)
-
-
-def first_moves(model: TabularModel, start: Floats) -> EndMoves:
+def first_moves(model: TabularModel, start: Floats) -> MergedMoves:
     """Every action from a state (n,), as far as it stays in the space and out of the truth."""
     return _allowed(model, *_from_state(model, start))
 
 
-def last_moves(model: TabularModel, cells: Ints, goal_cells: Ints, goal: Box) -> EndMoves:
-    """The moves from some cells into the goal's cells, bent to end in the goal region."""
+def last_moves(model: TabularModel, cells: Ints, goal_cells: Ints, goal: Box) -> MergedMoves:
+    """The moves from some cells, in order, into the goal's cells, bent to end in the goal."""
     # Whether the truth allows a move is seen on the bent path.
     row, move = np.nonzero(np.isin(model.successor[cells], goal_cells))
     cell = cells[row]
     origin, action = model.move_origins(cell, move), model.actions[model.action[move]]
     path = rollout(model.system, origin, action[:, None, :], model.dt, model.substeps)
-    return _allowed(model, cell, _bent(model, path, goal), model.reward[cell, move])
+    return _allowed(model, cell, move, _bent(model, path, goal), model.reward[cell, move])
 
 
-def only_moves(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> EndMoves:
+def only_moves(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> MergedMoves:
     """The moves of a trajectory of one step: from a state into the goal region."""
-    cell, path, reward = _from_state(model, start)
+    cell, action, path, reward = _from_state(model, start)
     into = np.isin(model.grid.index(path[:, -1]), goal_cells)
-    return _allowed(model, cell[into], _bent(model, path[into], goal), reward[into])
+    return _allowed(model, cell[into], action[into], _bent(model, path[into], goal), reward[into])
 
 
-def _from_state(model: TabularModel, start: Floats) -> tuple[Ints, Floats, Floats]:
-    """The cell (A,), path (A, K+1, n) and reward (A,) of every action from a state (n,)."""
+def _from_state(model: TabularModel, start: Floats) -> tuple[Ints, Ints, Floats, Floats]:
+    """The cell, action (A,), path (A, K+1, n) and reward (A,) of all actions from a state (n,)."""
     origin = np.broadcast_to(start, (len(model.actions), len(start)))
     path = rollout(model.system, origin, model.actions[:, None, :], model.dt, model.substeps)
     cell = np.full(len(origin), model.grid.index(start))
-    return cell, path, model.move_reward(origin, model.actions)
+    return cell, np.arange(len(origin)), path, model.move_reward(origin, model.actions)
 
 
 def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
@@ -75,9 +53,19 @@ def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
     return path - share * beyond[:, None, :]
 
 
-def _allowed(model: TabularModel, cell: Ints, path: Floats, reward: Floats) -> EndMoves:
-    """The moves with paths (L, K+1, n) that stay in the space and out of the truth."""
-    successor, crossings = follow(model.grid, model.regions, path)
-    crosses = np.asarray(crossings.toarray(), dtype=bool)
-    may = (successor >= 0) & ~np.any(crosses[:, model.truth], axis=1)
-    return EndMoves(cell[may], successor[may], reward[may], crosses[may])
+def _allowed(
+    model: TabularModel, cell: Ints, move: Ints, path: Floats, reward: Floats
+) -> MergedMoves:
+    """The moves with paths (L, K+1, n), in order of cell; those that leave the space or cross the
+    truth are forbidden. None is merged with another.
+    """
+    successor, crosses = follow(model.grid, model.regions, path)
+    forbidden = (successor < 0) | (crosses @ model.truth)
+    return MergedMoves(
+        begins=np.searchsorted(cell, np.arange(model.states + 1)),
+        successor=np.where(forbidden, 0, successor).astype(np.int32),
+        move=move,
+        log_weight=np.where(forbidden, -np.inf, reward),
+        crossing_begins=crosses.indptr.astype(np.int64),
+        crossing_region=crosses.indices.astype(np.int32),
+    )

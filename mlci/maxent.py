@@ -14,12 +14,12 @@ from functools import cached_property
 import numpy as np
 
 from mlci.demonstrations import Task
-from mlci.end_moves import EndMoves, first_moves, last_moves, only_moves
-from mlci.recursions import move_probabilities, reachable_cells
+from mlci.end_moves import first_moves, last_moves, only_moves
+from mlci.merged_moves import MergedMoves
+from mlci.recursions import Leg, avoidance, log_z_to_go, move_probabilities, reachable_cells
 from mlci.simulate import step_count
-from mlci.spaces import Box, Floats, Ints
+from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.tabular import TabularModel
-from mlci.task_batches import avoidance_of_tasks, log_z_of_tasks
 
 ROUNDED_TIMES = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
 
@@ -107,18 +107,31 @@ class TrajectoryDistribution:
         if self.ends is not None:  # what takes the time has been done
             scale = self.model.temperature / model.temperature
             vars(other)["start_moves"] = self.start_moves.scaled(scale)
+            vars(other)["reachable"] = self.reachable
             if self.steps > 1:
-                vars(other)["cells_between"] = self.cells_between
                 vars(other)["goal_moves"] = self.goal_moves.scaled(scale)
         return other
 
     @cached_property
     def log_z(self) -> Floats:
         """(T+1, S) log Z to go [nat], by the soft Bellman backup; log_z[0, start] is log Z."""
-        return log_z_of_tasks([self])[:, 0]
+        return log_z_to_go(self._legs, self.reachable, self.goal)
 
     @cached_property
-    def start_moves(self) -> EndMoves:
+    def reachable(self) -> Bools:
+        """(T+1, S) cells that can be occupied at each step, whether or not a goal follows."""
+        if self.ends is None:
+            return reachable_cells(self.model.merged, [self.start], self.steps)
+        reached = np.zeros((self.steps + 1, self.model.states), dtype=bool)
+        reached[0, self.start] = True
+        if self.steps > 1:
+            starts = self.start_moves.successor[self.start_moves.log_weight > -np.inf]
+            reached[1:-1] = reachable_cells(self.model.merged, starts, self.steps - 2)
+        reached[-1, self.goal] = True  # the last moves go nowhere else
+        return reached
+
+    @cached_property
+    def start_moves(self) -> MergedMoves:
         """The moves from the exact start; into the goal where there is one step."""
         assert self.ends is not None
         if self.steps == 1:
@@ -126,16 +139,22 @@ class TrajectoryDistribution:
         return first_moves(self.model, self.ends.start)
 
     @cached_property
-    def cells_between(self) -> list[Ints]:
-        """Cells that can be occupied after 1 .. T-1 moves from the exact start."""
-        starts = np.unique(self.start_moves.successor)
-        return reachable_cells(self.model.merged, starts, self.steps - 2)
-
-    @cached_property
-    def goal_moves(self) -> EndMoves:
+    def goal_moves(self) -> MergedMoves:
         """The moves that end at the exact goal."""
         assert self.ends is not None
-        return last_moves(self.model, self.cells_between[-1], self.goal, self.ends.goal)
+        cells = np.flatnonzero(self.reachable[-2])
+        return last_moves(self.model, cells, self.goal, self.ends.goal)
+
+    @property
+    def _legs(self) -> list[Leg]:
+        """The moves of each part of the way."""
+        if self.ends is None:
+            return [(self.model.merged, 0, self.steps)]
+        if self.steps == 1:
+            return [(self.start_moves, 0, 1)]
+        last = self.steps - 1
+        between = self.model.merged, 1, last
+        return [(self.start_moves, 0, 1), between, (self.goal_moves, last, last + 1)]
 
     @property
     def is_possible(self) -> bool:
@@ -156,15 +175,14 @@ class TrajectoryDistribution:
         """alpha_i (C,): the probability that a trajectory does not cross region i.
 
         alpha_t^i(s) = sum over the moves that do not cross i of pi_t(move | s) alpha_(t+1)^i(s'),
-        backwards from alpha_T = 1. Nothing is subtracted but where half or more is left, so that a
-        region which no trajectory avoids has exactly 0, and -log alpha is exact where 1 - alpha
-        would round to 1.
+        backwards from alpha_T = 1. Nothing is subtracted, so that a region which no trajectory
+        avoids has exactly 0, and -log alpha is exact where 1 - alpha would round to 1.
 
         Raises:
             ValueError: no trajectory reaches a goal.
         """
         self._require_possible("probabilities are not defined")
-        return avoidance_of_tasks([self])[0]
+        return avoidance(self._legs, self.log_z, self.start, len(self.model.regions))
 
     def violation_probabilities(self) -> Floats:
         """Phi_(i,T) = 1 - alpha_i (C,): the probability that a trajectory crosses region i."""

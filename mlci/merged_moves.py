@@ -26,12 +26,9 @@ class MergedMoves:
         successor: (W,) cell that a merged move leads to.
         move: (W,) one of its moves, which crosses what the others cross.
         log_weight: (W,) log of the sum of e^reward over its moves [nat]; -inf if it is forbidden.
-        crossing_begins: (S+1,) where each cell's crossings begin, of those that are not certain.
-        crossing_move: (E,) merged move of each crossing.
-        crossing_region: (E,) region of each crossing.
-        certain_begins: (S+1,) likewise of regions that all moves of a cell cross, as where the cell
-            lies inside.
-        certain_region: (F,) these regions.
+        crossing_begins: (W+1,) the regions that merged move k crosses are crossing_region[i] for i
+            from crossing_begins[k] to crossing_begins[k+1].
+        crossing_region: (E,) these regions.
     """
 
     begins: Ints
@@ -39,39 +36,25 @@ class MergedMoves:
     move: Ints
     log_weight: Floats
     crossing_begins: Ints
-    crossing_move: Ints
     crossing_region: Ints
-    certain_begins: Ints
-    certain_region: Ints
 
     @property
     def states(self) -> int:
         """S, the number of cells."""
         return len(self.begins) - 1
 
-    def copies(self, count: int) -> MergedMoves:
-        """Those of as many copies of the model side by side: cell s of copy j is cell j S + s."""
-        if count == 1:
-            return self
-        moves = len(self.successor)
+    def scaled(self, factor: float) -> MergedMoves:
+        """The same with rewards times a factor, as at another temperature; no two are merged."""
+        return replace(self, log_weight=self.log_weight * factor)
 
-        def begins(one: Ints) -> Ints:
-            return np.append(0, np.add.outer(np.arange(count) * one[-1], one[1:]).ravel())
-
-        def shifted(numbers: Ints, size: int) -> Ints:
-            return np.add.outer(np.arange(count) * size, numbers).ravel()
-
-        return MergedMoves(
-            begins=begins(self.begins),
-            successor=shifted(self.successor, self.states),
-            move=np.tile(self.move, count),
-            log_weight=np.tile(self.log_weight, count),
-            crossing_begins=begins(self.crossing_begins),
-            crossing_move=shifted(self.crossing_move, moves),
-            crossing_region=np.tile(self.crossing_region, count),
-            certain_begins=begins(self.certain_begins),
-            certain_region=np.tile(self.certain_region, count),
-        )
+    def crosses(self, moves: Ints, regions: int) -> Bools:
+        """(L, C) which of the C regions some merged moves (L,) cross."""
+        crossed = np.zeros((len(moves), regions), dtype=bool)
+        for row, begin, end in zip(
+            crossed, self.crossing_begins[moves], self.crossing_begins[moves + 1], strict=True
+        ):
+            row[self.crossing_region[begin:end]] = True
+        return crossed
 
     def without(self, crossed: Bools) -> MergedMoves:
         """The same with those forbidden whose moves are `crossed` (S, M)."""
@@ -94,21 +77,19 @@ def merge_moves(
         crosses: (S * M, C) which regions a move crosses.
         blocks: of cells, in order, whose moves are held at once.
     """
-    moves, regions = successor.shape[1], crosses.shape[1]
+    moves = successor.shape[1]
     parts = []
     for block in blocks:
         ends = crosses.indptr[block.start * moves : block.stop * moves + 1]
         entries = crosses.indices[ends[0] : ends[-1]]
         parts.append(
-            _merge_block(
-                successor[block], reward[block], allowed[block], entries, ends - ends[0], regions
-            )
+            _merge_block(successor[block], reward[block], allowed[block], entries, ends - ends[0])
         )
     return _concatenated(parts)
 
 
 def _merge_block(
-    successor: Ints, reward: Floats, allowed: Bools, entries: Ints, ends: Ints, regions: int
+    successor: Ints, reward: Floats, allowed: Bools, entries: Ints, ends: Ints
 ) -> MergedMoves:
     """The merged moves of some cells (Q, M); move k of them crosses entries[ends[k]:ends[k+1]]."""
     cells, moves = successor.shape
@@ -118,25 +99,14 @@ def _merge_block(
     cell, move = np.divmod(row[first], moves)
     # What the first move crosses, all of a merged move cross.
     count = ends[row[first] + 1] - ends[row[first]]
-    owner = np.repeat(np.arange(len(first)), count)
-    place = np.arange(len(owner)) + np.repeat(ends[row[first]] - np.cumsum(count) + count, count)
-    region = entries[place]
-    pair, which, times = np.unique(
-        cell[owner] * regions + region, return_inverse=True, return_counts=True
-    )
-    of_cell = np.bincount(cell, minlength=cells)
-    certain = times == of_cell[pair // regions]
-    uncertain = ~certain[which]
+    entry = np.arange(np.sum(count)) + np.repeat(ends[row[first]] - np.cumsum(count) + count, count)
     return MergedMoves(
-        begins=_begins(of_cell),
+        begins=_begins(np.bincount(cell, minlength=cells)),
         successor=successor.ravel()[row[first]].astype(np.int32),
         move=move.astype(np.min_scalar_type(moves)),
         log_weight=_log_sums(np.where(allowed, reward, -np.inf).ravel()[row], first),
-        crossing_begins=_begins(np.bincount(cell[owner[uncertain]], minlength=cells)),
-        crossing_move=owner[uncertain],
-        crossing_region=region[uncertain].astype(np.int32),
-        certain_begins=_begins(np.bincount(pair[certain] // regions, minlength=cells)),
-        certain_region=(pair[certain] % regions).astype(np.int32),
+        crossing_begins=_begins(count),
+        crossing_region=entries[entry].astype(np.int32),
     )
 
 
@@ -149,24 +119,19 @@ def _concatenated(parts: Sequence[MergedMoves]) -> MergedMoves:
     def begins(name: str) -> Ints:
         return _begins(np.concatenate([np.diff(getattr(part, name)) for part in parts]))
 
-    before = np.cumsum([0, *(len(part.successor) for part in parts)])
-    numbers = [part.crossing_move + start for part, start in zip(parts, before, strict=False)]
     return MergedMoves(
         begins=begins("begins"),
         successor=joined("successor"),
         move=joined("move"),
         log_weight=joined("log_weight"),
         crossing_begins=begins("crossing_begins"),
-        crossing_move=np.concatenate(numbers),
         crossing_region=joined("crossing_region"),
-        certain_begins=begins("certain_begins"),
-        certain_region=joined("certain_region"),
     )
 
 
 def _begins(counts: Ints) -> Ints:
     """(Q+1,) where each of Q runs begins in an array of all, and where the last one ends."""
-    return np.append(0, np.cumsum(counts))
+    return np.append(0, np.cumsum(counts)).astype(np.int64)
 
 
 def _groups(successor: Ints, allowed: Bools, entries: Ints, ends: Ints) -> tuple[Ints, Bools]:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlci.end_moves import EndMoves
 from mlci.maxent import TrajectoryDistribution
+from mlci.merged_moves import MergedMoves
 from mlci.spaces import Bools, Floats, Ints
 from mlci.tabular import TabularModel
 
@@ -93,7 +93,7 @@ def sample_crossings(
     log_z, cell = distribution.log_z, np.full(count, distribution.start)
     first = distribution.start_moves
     move = _draw(first, log_z[1], cell, rng)
-    crossed, cells, moves = first.crosses[move], [first.successor[move]], []
+    crossed, cells, moves = first.crosses(move, len(model.regions)), [first.successor[move]], []
     if steps == 1:
         return crossed
     for t in range(1, steps - 1):
@@ -102,7 +102,8 @@ def sample_crossings(
     if moves:
         crossed |= _crossed(model, np.stack(cells[:-1], axis=1), np.stack(moves, axis=1))
     last = distribution.goal_moves
-    return crossed | last.crosses[_draw(last, log_z[steps], cells[-1], rng)]
+    move = _draw(last, log_z[steps], cells[-1], rng)
+    return crossed | last.crosses(move, len(model.regions))
 
 
 def _crossed(model: TabularModel, cells: Ints, moves: Ints) -> Bools:
@@ -113,12 +114,13 @@ def _crossed(model: TabularModel, cells: Ints, moves: Ints) -> Bools:
     return crossed
 
 
-def _draw(moves: EndMoves, log_z_after: Floats, cell: Ints, rng: np.random.Generator) -> Ints:
+def _draw(moves: MergedMoves, log_z_after: Floats, cell: Ints, rng: np.random.Generator) -> Ints:
     """(count,) for each cell (count,), one of the moves that begin in it, by its probability."""
-    value = moves.reward + log_z_after[moves.successor]
+    value = moves.log_weight + log_z_after[moves.successor]
     drawn = np.empty(len(cell), dtype=np.int64)
     for here in np.unique(cell):
-        among, who = np.flatnonzero(moves.cell == here), np.flatnonzero(cell == here)
+        among = np.arange(moves.begins[here], moves.begins[here + 1])
+        who = np.flatnonzero(cell == here)
         cumulative = np.cumsum(np.exp(value[among] - np.max(value[among])))
         draws = rng.random(len(who)) * cumulative[-1]
         drawn[who] = among[np.searchsorted(cumulative, draws, side="right")]

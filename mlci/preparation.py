@@ -23,7 +23,6 @@ from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions, as_mask
 from mlci.spaces import Bools, Floats
 from mlci.tabular import Progress, TabularModel
-from mlci.task_batches import are_possible, avoidance_of_tasks, batches
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,12 +233,12 @@ def prepare(
     avoidance, decided = np.ones((len(tasks), count)), np.zeros((len(tasks), count), dtype=bool)
     reachable = np.zeros(len(tasks), dtype=bool)
     if tasks:
-        _ = model.merged  # once for all tasks and processes
-    work = Parallel(n_jobs=n_jobs, return_as="generator")(
-        delayed(_avoidance_probabilities)(batch) for batch in batches(distributions)
+        _ = model.merged  # once for all tasks
+    # Threads, as machine code does the work.
+    work = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")(
+        delayed(_avoidance_probabilities)(distribution) for distribution in distributions
     )
-    of_tasks = (of_task for of_batch in work for of_task in zip(*of_batch, strict=True))
-    for j, of_task in enumerate(of_tasks):
+    for j, of_task in enumerate(work):
         reachable[j], avoidance[j], decided[j] = of_task
         if progress is not None:
             progress(j + 1, len(tasks))
@@ -248,24 +247,17 @@ def prepare(
     )
 
 
-def _avoidance_probabilities(
-    batch: Sequence[TrajectoryDistribution],
-) -> tuple[Bools, Floats, Bools]:
-    """Which tasks can be done (N,), alpha (N, C), 1 if not, and what a cell decides (N, C)."""
-    shape = len(batch), len(batch[0].model.regions)
-    avoidance, decided = np.ones(shape), np.zeros(shape, dtype=bool)
-    reachable = are_possible(batch)
-    if reachable.any():
-        able = [each for each in batch if each.is_possible]
-        avoidance[reachable] = avoidance_of_tasks(able)
-        if batch[0].ends is not None:
-            between_cells = [replace(each, ends=None) for each in able]
-            also = are_possible(between_cells)
-            if also.any():
-                of_cells = avoidance_of_tasks([each for each in between_cells if each.is_possible])
-                rows = np.flatnonzero(reachable)[also]
-                decided[rows] = decided_by_cell(of_cells, avoidance[rows])
-    return reachable, avoidance, decided
+def _avoidance_probabilities(distribution: TrajectoryDistribution) -> tuple[bool, Floats, Bools]:
+    """Whether a task can be done, alpha (C,), 1 if not, and what a cell decides (C,)."""
+    count = len(distribution.model.regions)
+    nothing = np.zeros(count, dtype=bool)
+    if not distribution.is_possible:
+        return False, np.ones(count), nothing
+    avoidance = distribution.avoidance_probabilities()
+    between_cells = replace(distribution, ends=None)
+    if distribution.ends is None or not between_cells.is_possible:
+        return True, avoidance, nothing
+    return True, avoidance, decided_by_cell(between_cells.avoidance_probabilities(), avoidance)
 
 
 def _violations(

@@ -2,174 +2,152 @@
 
 log_z[t, s] is the log of the sum of e^(reward to go) over all ways to get from cell s at step t
 into a goal cell at step T, and -inf where there is none or where s cannot be occupied.
-alpha_t(s, i) is the probability of avoiding region i from there on; its rows are the cells with
-finite log_z[t].
+alpha_t(s, i) is the probability of avoiding region i from there on, of cells with finite
+log_z[t, s].
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
-from scipy import sparse
 
-from mlci.end_moves import EndMoves
+from mlci.compiled import compiled
 from mlci.merged_moves import MergedMoves
-from mlci.spaces import Floats, Ints
+from mlci.spaces import Bools, Floats, Ints
 from mlci.tabular import TabularModel
 
-_CELLS_AT_ONCE = 1 << 12  # whose moves a step of work holds
+ALPHA_BYTES = 1 << 29  # of probabilities held at once, else regions go block by block
+
+# Moves, and the steps from which and to which they are taken.
+Leg = tuple[MergedMoves, int, int]
 
 
-def reachable_cells(merged: MergedMoves, starts: Ints, steps: int) -> list[Ints]:
-    """Cells that can be occupied after t = 0 .. steps allowed moves from some of the starts."""
-    cells = [starts]
-    for _ in range(steps):
-        move, _ = _ranges(merged.begins, cells[-1])
-        mark = np.zeros(merged.states, dtype=bool)
-        mark[merged.successor[move[merged.log_weight[move] > -np.inf]]] = True
-        cells.append(np.flatnonzero(mark))
-    return cells
+def reachable_cells(moves: MergedMoves, starts: Ints | Sequence[int], steps: int) -> Bools:
+    """(T+1, S) whether a cell can be occupied after t = 0 .. T moves from some of the starts."""
+    reached = np.zeros((steps + 1, moves.states), dtype=bool)
+    reached[0, starts] = True
+    _spread(moves.begins, moves.successor, moves.log_weight, reached)
+    return reached
 
 
-def soft_bellman_backup(merged: MergedMoves, log_z: Floats, cells: dict[int, Ints]) -> None:
-    """Fill in log_z (T+1, S), backwards over the cells that can be occupied at each step."""
-    for t in sorted(cells, reverse=True):
-        for here in _parts(merged, cells[t]):
-            move, ends = _ranges(merged.begins, here)
-            value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
-            best = np.maximum.reduceat(value, ends[:-1])
-            finite = best > -np.inf
-            shift = np.repeat(np.where(finite, best, 0.0), np.diff(ends))
-            total = np.add.reduceat(np.exp(value - shift), ends[:-1])
-            log_z[t, here[finite]] = best[finite] + np.log(total[finite])
+def log_z_to_go(legs: Sequence[Leg], reachable: Bools, goal: Ints) -> Floats:
+    """log_z (T+1, S) [nat] into the goal cells (G,), of cells that are reachable (T+1, S)."""
+    log_z = np.full(reachable.shape, -np.inf)
+    log_z[-1, goal[reachable[-1, goal]]] = 0.0
+    for moves, early, late in reversed(legs):
+        arrays = moves.begins, moves.successor, moves.log_weight
+        _soft_bellman(*arrays, reachable, early, late, log_z)
+    return log_z
 
 
-def add_moves(log_z: Floats, t: int, moves: EndMoves) -> None:
-    """Fill in log_z[t] of the cells in which some moves begin."""
-    np.logaddexp.at(log_z[t], moves.cell, moves.reward + log_z[t + 1, moves.successor])
+def avoidance(legs: Sequence[Leg], log_z: Floats, start: int, regions: int) -> Floats:
+    """alpha_0 (C,) of the start cell."""
+    steps, states = len(log_z) - 1, log_z.shape[1]
+    blocks = max(1, min(regions, -(-regions * 2 * 8 * states // ALPHA_BYTES)))
+    alpha = np.empty(regions)
+    for first, last in pairwise(np.linspace(0, regions, blocks + 1).astype(int).tolist()):
+        of_two_steps = np.empty((2, states, last - first))
+        of_two_steps[steps % 2, log_z[steps] > -np.inf] = 1.0
+        for moves, early, late in reversed(legs):
+            arrays = moves.begins, moves.successor, moves.log_weight
+            crossings = moves.crossing_begins, moves.crossing_region
+            _avoid(*arrays, *crossings, log_z, early, late, first, of_two_steps)
+        alpha[first:last] = of_two_steps[0, start]
+    return np.minimum(alpha, 1.0)
 
 
-def avoidance_of_moves(
-    log_z: Floats, t: int, moves: EndMoves, alpha_after: Floats, first: int
-) -> Floats:
-    """alpha_t (Q, C') of the cells with probability at step t, from moves at an end."""
-    cells, after = (np.flatnonzero(log_z[step] > -np.inf) for step in (t, t + 1))
-    value = moves.reward + log_z[t + 1, moves.successor]
-    counts = value > -np.inf  # moves into cells from which no goal can be reached do not
-    row, row_after = (
-        np.searchsorted(where, of[counts])
-        for where, of in ((cells, moves.cell), (after, moves.successor))
-    )
-    probability = np.exp(value[counts] - log_z[t, moves.cell[counts]])
-    avoids = ~moves.crosses[counts, first : first + alpha_after.shape[1]]
-    alpha = np.zeros((len(cells), alpha_after.shape[1]))
-    np.add.at(alpha, row, probability[:, None] * avoids * alpha_after[row_after])
-    return alpha
+@compiled("void(i8[::1], i4[::1], f8[::1], b1[:, ::1])")
+def _spread(begins: Ints, successor: Ints, log_weight: Floats, reached: Bools) -> None:
+    """Fill in which cells are reached (T+1, S) after each step, from those at step 0."""
+    for t in range(reached.shape[0] - 1):
+        for s in range(reached.shape[1]):
+            if reached[t, s]:
+                for k in range(begins[s], begins[s + 1]):
+                    if log_weight[k] > -np.inf:
+                        reached[t + 1, successor[k]] = True
 
 
-def avoidance_backwards(
-    merged: MergedMoves, log_z: Floats, alpha: Floats, late: int, early: int, first: int
-) -> Floats:
-    """alpha (Q, C') at step `early` of the regions from `first` on, from that at step `late`."""
-    row_of = np.zeros(merged.states, dtype=np.int64)
-    cells_after = np.flatnonzero(log_z[late] > -np.inf)
-    for t in reversed(range(early, late)):
-        row_of[:] = -1
-        row_of[cells_after] = np.arange(len(cells_after))
-        cells = np.flatnonzero(log_z[t] > -np.inf)
-        alpha_after, alpha = alpha, np.empty((len(cells), alpha.shape[1]))
-        row = 0
-        for here in _parts(merged, cells):
-            now = alpha[row : row + len(here)]
-            now[:] = _alpha_one_step_back(merged, log_z, t, here, row_of, alpha_after, first)
-            row += len(here)
-        cells_after = cells
-    return alpha
-
-
-def _alpha_one_step_back(
-    merged: MergedMoves,
+@compiled("void(i8[::1], i4[::1], f8[::1], b1[:, ::1], i8, i8, f8[:, ::1])")
+def _soft_bellman(
+    begins: Ints,
+    successor: Ints,
+    log_weight: Floats,
+    reachable: Bools,
+    early: int,
+    late: int,
     log_z: Floats,
-    t: int,
-    cells: Ints,
-    row_of: Ints,
-    alpha_after: Floats,
+) -> None:
+    """log_z[t, s] = log sum_k e^(log_weight[k] + log_z[t+1, s'_k]), for t from late - 1 to early.
+
+    The sum is over the merged moves k of cell s; log_z (T+1, S) is filled in where `reachable`.
+    """
+    for t in range(late - 1, early - 1, -1):
+        for s in range(log_z.shape[1]):
+            if not reachable[t, s]:
+                continue
+            best = -np.inf
+            for k in range(begins[s], begins[s + 1]):
+                best = max(best, log_weight[k] + log_z[t + 1, successor[k]])
+            if best == -np.inf:
+                continue
+            total = 0.0
+            for k in range(begins[s], begins[s + 1]):
+                value = log_weight[k] + log_z[t + 1, successor[k]]
+                if value > -np.inf:
+                    total += np.exp(value - best)
+            log_z[t, s] = best + np.log(total)
+
+
+@compiled(
+    "void(i8[::1], i4[::1], f8[::1], i8[::1], i4[::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])"
+)
+def _avoid(
+    begins: Ints,
+    successor: Ints,
+    log_weight: Floats,
+    crossing_begins: Ints,
+    crossing_region: Ints,
+    log_z: Floats,
+    early: int,
+    late: int,
     first: int,
-) -> Floats:
-    """alpha_t (Q, C') of some cells, from alpha_(t+1) (Q', C'), whose rows `row_of` (S,) gives.
+    alpha: Floats,
+) -> None:
+    """alpha_t(s, i) = sum_k pi_t(k | s) alpha_(t+1)(s'_k, i), for t from late - 1 to early.
 
-    First the sum over all moves, as a product. Then, for the cells and regions that some move
-    crosses: less what those moves bring where that is up to a half, which costs no digit; elsewhere
-    the sum over the others anew.
+    The sum is over the merged moves k of cell s that do not cross region i: the entries of regions
+    that k crosses are put back to what they were. alpha (2, S, C') holds step t at t % 2, of the
+    regions from `first` on.
     """
-    width = alpha_after.shape[1]
-    last = first + width
-    move, ends = _ranges(merged.begins, cells)
-    value = merged.log_weight[move] + log_z[t + 1, merged.successor[move]]
-    probability = np.exp(value - np.repeat(log_z[t, cells], np.diff(ends)))
-    probability /= np.repeat(np.add.reduceat(probability, ends[:-1]), np.diff(ends))
-    # A successor outside the support has probability 0: whichever row stands for it.
-    column = np.maximum(row_of[merged.successor[move]], 0)
-    shape = len(cells), len(alpha_after)
-    alpha = sparse.csr_matrix((probability, column, ends), shape=shape) @ alpha_after
-    owner, entry, region = _of_cells(
-        merged.crossing_begins, merged.crossing_region, cells, first, last
-    )
-    place = merged.crossing_move[entry] - merged.begins[cells[owner]]
-    crossing = ends[owner] + place
-    lost = np.bincount(
-        owner * width + region,
-        probability[crossing] * alpha_after[column[crossing], region],
-        minlength=alpha.size,
-    ).reshape(alpha.shape)
-    anew = lost > alpha / 2
-    alpha -= lost
-    again = anew[owner, region]
-    if again.any():
-        owner, region, place = owner[again], region[again], place[again]
-        pair, which = np.unique(owner * width + region, return_inverse=True)
-        cell_of, region_of = np.divmod(pair, width)
-        # All moves of the cell of each pair, one pair after the other, without those that cross.
-        every, begins = _ranges(ends, cell_of)
-        weight = probability[every]
-        weight[begins[which] + place] = 0.0
-        weight *= alpha_after[column[every], np.repeat(region_of, np.diff(begins))]
-        alpha[cell_of, region_of] = np.add.reduceat(weight, begins[:-1])
-    owner, _, region = _of_cells(merged.certain_begins, merged.certain_region, cells, first, last)
-    alpha[owner, region] = 0.0
-    return alpha
-
-
-def _of_cells(
-    begins: Ints, regions: Ints, cells: Ints, first: int, last: int
-) -> tuple[Ints, Ints, Ints]:
-    """Entries of some cells whose regions are from `first` to before `last`.
-
-    Returns the place in `cells` that each belongs to, its own number, and its region less `first`.
-    """
-    entry, ends = _ranges(begins, cells)
-    owner = np.repeat(np.arange(len(cells)), np.diff(ends))
-    region = regions[entry] - first
-    inside = (region >= 0) & (region < last - first)
-    if inside.all():
-        return owner, entry, region
-    return owner[inside], entry[inside], region[inside]
-
-
-def _parts(merged: MergedMoves, cells: Ints) -> Iterator[Ints]:
-    """Cells that some move leaves, in parts whose moves fit into memory and cache."""
-    begins = merged.begins
-    left = cells[begins[cells + 1] > begins[cells]]
-    for first in range(0, len(left), _CELLS_AT_ONCE):
-        yield left[first : first + _CELLS_AT_ONCE]
-
-
-def _ranges(begins: Ints, cells: Ints) -> tuple[Ints, Ints]:
-    """The numbers from begins[s] to before begins[s+1] of some cells s, and where each begin."""
-    counts = begins[cells + 1] - begins[cells]
-    ends = np.append(0, np.cumsum(counts))
-    return np.arange(ends[-1]) + np.repeat(begins[cells] - ends[:-1], counts), ends
+    regions = alpha.shape[2]
+    kept = np.empty(regions)
+    for t in range(late - 1, early - 1, -1):
+        for s in range(log_z.shape[1]):
+            if log_z[t, s] == -np.inf:
+                continue
+            here, total = alpha[t % 2, s], 0.0
+            here[:] = 0.0
+            for k in range(begins[s], begins[s + 1]):
+                value = log_weight[k] + log_z[t + 1, successor[k]]
+                if value == -np.inf:
+                    continue
+                probability = np.exp(value - log_z[t, s])
+                total += probability
+                there = alpha[(t + 1) % 2, successor[k]]
+                for entry in range(crossing_begins[k], crossing_begins[k + 1]):
+                    region = crossing_region[entry] - first
+                    if 0 <= region < regions:
+                        kept[region] = here[region]
+                for i in range(regions):
+                    here[i] += probability * there[i]
+                for entry in range(crossing_begins[k], crossing_begins[k + 1]):
+                    region = crossing_region[entry] - first
+                    if 0 <= region < regions:
+                        here[region] = kept[region]
+            for i in range(regions):
+                here[i] /= total
 
 
 def move_probabilities(model: TabularModel, log_z: Floats, t: int, cells: Ints) -> Floats:

@@ -39,9 +39,9 @@ MLCI = {
     "mlci.tabular": "mlci.merged_moves mlci.regions mlci.simulate",
     "mlci.diagnosis": "mlci.tabular",
     "mlci.end_moves": "mlci.tabular",
-    "mlci.recursions": "mlci.end_moves",
-    "mlci.task_batches": "mlci.recursions",
-    "mlci.maxent": "mlci.task_batches mlci.demonstrations",
+    "mlci.compiled": "",
+    "mlci.recursions": "mlci.compiled mlci.tabular",
+    "mlci.maxent": "mlci.end_moves mlci.recursions mlci.demonstrations",
     "mlci.evidence": "mlci.spaces",
     "mlci.forecasts": "mlci.regions",
     "mlci.forecast_scores": "mlci.forecasts",
@@ -61,7 +61,7 @@ MLCI = {
     "mlci.metrics": "mlci.evidence",
 }
 # What mlci may import of others: no configs, no formats but those of recordings, no figures.
-MATHEMATICS = "numpy scipy pandas pyarrow joblib pint openpyxl ezc3d"
+MATHEMATICS = "numpy scipy numba pandas pyarrow joblib pint openpyxl ezc3d"
 
 # A room of the framework, and all that it may import of this project.
 TRACKING, POINT = (

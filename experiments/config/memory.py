@@ -6,7 +6,7 @@ import math
 import os
 
 from experiments.config.settings import ModelSettings, Settings
-from mlci.task_batches import ALPHA_BYTES
+from mlci.recursions import ALPHA_BYTES
 
 # Measured on points of 0.4 to 4 million moves, and `python -m tests.benchmark` compares: a move has
 # successor, reward, its place among the cell's successors and the regions that it crosses, and most

@@ -16,7 +16,6 @@ from mlci.metrics import final_state_error, violation_distance
 from mlci.simulate import rollout
 from mlci.spaces import Bools, Floats, Ints
 from mlci.systems import System
-from mlci.task_batches import are_possible, avoidance_of_tasks, batches
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,21 +51,18 @@ def measure_point(settings: Settings, point: PointInference) -> Measures:
     if settings.rollouts == 0:
         nothing = np.full(count, np.nan)
         return Measures(feasible, phi, nothing, nothing, nothing, nothing, {})
-    tasks, first = [demonstration.task for demonstration in point.demonstrations], 0
-    for batch in batches(TrajectoryDistribution.of_task(model, task) for task in tasks):
-        members = first + np.flatnonzero(are_possible(batch))
-        first += len(batch)
-        if not len(members):
+    for j, demonstration in enumerate(point.demonstrations):
+        distribution = TrajectoryDistribution.of_task(model, demonstration.task)
+        if not distribution.is_possible:
             continue
-        able = [distribution for distribution in batch if distribution.is_possible]
-        feasible[members] = True
-        phi[members] = 1 - avoidance_of_tasks(able)[:, point.hypotheses]
-        for number, distribution in zip(point.numbers[members].tolist(), able, strict=True):
-            cells, moves = distribution.sample(
-                settings.rollouts, stream(settings.seed, Purpose.ROLLOUTS, number)
-            )
-            trajectories[number] = cells[0], moves[0]
-            controls.append(model.actions[model.action[moves]])
+        feasible[j] = True
+        phi[j] = distribution.violation_probabilities()[point.hypotheses]
+        number = int(point.numbers[j])
+        cells, moves = distribution.sample(
+            settings.rollouts, stream(settings.seed, Purpose.ROLLOUTS, number)
+        )
+        trajectories[number] = cells[0], moves[0]
+        controls.append(model.actions[model.action[moves]])
     error, distance, floor, share = np.full((4, count), np.nan)
     if feasible.any():
         done = [point.demonstrations[j] for j in np.flatnonzero(feasible)]

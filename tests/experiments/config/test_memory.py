@@ -21,8 +21,8 @@ def test_a_model_takes_no_more_than_expected_and_not_much_less(
     monkeypatch: pytest.MonkeyPatch, settings: Settings
 ) -> None:
     """Discretisation and one task; a point holds most arrays twice while it joins them."""
-    for name in ("mlci.tabular._MOVES_AT_ONCE", "mlci.recursions._CELLS_AT_ONCE"):
-        monkeypatch.setattr(name, 1 << 13)  # so that blocks of work do not count
+    # So that blocks of work do not count.
+    monkeypatch.setattr("mlci.tabular._MOVES_AT_ONCE", 1 << 13)
     large = dataclasses.replace(
         settings, grid=GridSettings((160, 100), None), actions=9, dt=0.1, horizon=2.0
     )
