@@ -89,14 +89,16 @@ class Grid:
         Cells are half open; the upper bound of the space belongs to the last cell.
         """
         wrapped = self.space.wrap(states)
-        position = np.floor((wrapped - self._lower) / self.widths)
-        # What lies before the first cell of a shifted dimension belongs to the last.
-        position = np.where(
-            self.space.periodic & (position < 0), np.array(self.shape) - 1, position
-        )
-        position = np.clip(np.nan_to_num(position), 0, np.array(self.shape) - 1).astype(np.int64)
-        number = np.ravel_multi_index(tuple(np.moveaxis(position, -1, 0)), self.shape)
-        return np.where(self.space.contains(wrapped), number, -1)
+        inside = self.space.contains(wrapped)
+        number = np.zeros(inside.shape, dtype=np.int64)
+        for d, count in enumerate(self.shape):
+            position = np.floor((wrapped[..., d] - self._lower[d]) / self.widths[d])
+            position = np.where(inside, position, 0.0).astype(np.int64)
+            # What lies before the first cell of a shifted dimension belongs to the last.
+            before = count - 1 if self.space.periodic[d] else 0
+            position = np.where(position < 0, before, np.minimum(position, count - 1))
+            number = number * count + position
+        return np.where(inside, number, -1)
 
     def points_inside(self, samples: int, cells: slice | Ints = slice(None)) -> Floats:
         """(S, samples^n, n): the centres of a regular subdivision of every cell, or of some."""

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
+from mlci.chords import Boxes
 from mlci.grids import Grid
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
-
-_CHORDS_AT_ONCE = 1 << 13  # C x 8 KiB of a crossing test stay in the second level of cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,83 +175,45 @@ class Regions:
         dimensions, so the path need not be unwrapped. A path of one sample is a point.
         """
         paths = np.asarray(paths, dtype=float)
-        batch, n = paths.shape[:-2], self.space.dimension
+        batch = paths.shape[:-2]
         if paths.shape[-2] == 1:
             paths = np.repeat(paths, 2, axis=-2)
         flat = paths.reshape(-1, *paths.shape[-2:])
-        starts = flat[:, :-1]
-        steps = self.space.difference(flat[:, 1:], starts)
-        owner = np.repeat(np.arange(len(flat)), starts.shape[1])
-        hits = self.crossings(starts.reshape(-1, n), steps.reshape(-1, n), owner, len(flat))
+        hits = self.crossings(flat[:, :-1], self.space.difference(flat[:, 1:], flat[:, :-1]))
         return np.asarray(hits.toarray()).reshape(*batch, len(self))
 
     def crossings(
-        self, starts: Floats, steps: Floats, owner: Ints, owners: int
+        self, starts: Floats, steps: Floats, tested: Bools | None = None
     ) -> sparse.csr_matrix:
-        """Which regions straight chords cross, gathered by the path that each belongs to.
+        """Which regions paths of straight chords cross.
 
         Args:
-            starts: (Q, n) first ends of the chords.
-            steps: (Q, n) displacements; below half a period in periodic dimensions.
-            owner: (Q,) the row of the result that a chord counts for; cheapest if ascending.
-            owners: number of rows.
+            starts: (P, K, n) first ends of the chords of P paths.
+            steps: (P, K, n) displacements; below half a period in periodic dimensions.
+            tested: (P,) which paths count, the others cross nothing; None for all.
 
         Returns:
-            (owners, C) sparse boolean matrix.
+            (P, C) sparse boolean matrix.
         """
-        keys = [np.empty(0, dtype=np.int64)]
-        for first in range(0, len(starts), _CHORDS_AT_ONCE):
-            part = slice(first, first + _CHORDS_AT_ONCE)
-            chord, image, *_ = self.chord_hits(self.space.wrap(starts[part]), steps[part])
-            key = owner[part][chord] * len(self) + self.images[0][image]
-            begin, end = owner[part].min() * len(self), (owner[part].max() + 1) * len(self)
-            entered = np.zeros(end - begin, dtype=bool)
-            entered[key - begin] = True
-            keys.append(begin + np.flatnonzero(entered))
-        # Only a path that lies in two parts can be there twice.
-        rows, columns = np.divmod(np.unique(np.concatenate(keys)), len(self))
-        ends = np.append(0, np.cumsum(np.bincount(rows, minlength=owners)))
-        return sparse.csr_matrix(
-            (np.ones(len(rows), dtype=bool), columns, ends), shape=(owners, len(self))
-        )
+        tested = np.ones(len(starts), dtype=bool) if tested is None else tested
+        begins, region, *_ = self._boxes.hits(self.space.wrap(starts), steps, tested)
+        entered = np.ones(len(region), dtype=bool)
+        return sparse.csr_matrix((entered, region, begins), shape=(len(starts), len(self)))
 
     def chord_hits(self, starts: Floats, steps: Floats) -> tuple[Ints, Ints, Floats, Floats]:
         """Pairs (chord, image) that meet, and shares of the chord between; starts wrapped."""
         region, lower, upper = self.images
-        low, high = np.minimum(starts, starts + steps), np.maximum(starts, starts + steps)
-        near = np.ones((len(region), len(starts)), dtype=bool)
-        for d, first, last, which in self._sides:
-            near &= ((low[:, d] < last[:, None]) & (high[:, d] > first[:, None]))[which]
-        image, chord = np.divmod(np.flatnonzero(near), len(starts))
-        # Slabs: the chord is between the two sides of dimension d at times from enter to leave.
-        # A near chord is between the two sides at some time in (0, 1) in each dimension, and at
-        # all times where it stands still: it hits if it is between all of them at once.
-        enter, leave = np.full(len(chord), -np.inf), np.full(len(chord), np.inf)
-        for d, *_ in self._sides:
-            start, step = starts[chord, d], steps[chord, d]
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                to_lower = (lower[image, d] - start) / step
-                to_upper = (upper[image, d] - start) / step
-            still = step == 0
-            np.maximum(enter, np.where(still, -np.inf, np.minimum(to_lower, to_upper)), out=enter)
-            np.minimum(leave, np.where(still, np.inf, np.maximum(to_lower, to_upper)), out=leave)
-        hit = enter < leave
-        return chord[hit], image[hit], enter[hit], leave[hit]
+        each = Boxes.of(lower, upper, np.arange(len(region)))
+        begins, image, enter, leave = each.hits(
+            starts[:, None], steps[:, None], np.ones(len(starts), dtype=bool)
+        )
+        return np.repeat(np.arange(len(starts)), np.diff(begins)), image, enter, leave
 
     @cached_property
-    def _sides(self) -> list[tuple[int, Floats, Floats, Ints]]:
-        """The distinct sides in each dimension that some region bounds, and whose they are.
-
-        Few distinct sides make many boxes: a chord is compared with each side once. Returns the
-        dimension, the sides' first and last ends, and (I,) the side of each of the `images`.
-        """
-        _, lower, upper = self.images
-        found = []
-        for d in np.flatnonzero(np.any(np.isfinite(lower), axis=0)):
-            ends = np.stack([lower[:, d], upper[:, d]], axis=1)
-            sides, which = np.unique(ends, axis=0, return_inverse=True)
-            found.append((int(d), sides[:, 0], sides[:, 1], which.ravel()))
-        return found
+    def _boxes(self) -> Boxes:
+        """The images, for `crossings`: those of one region count once."""
+        region, lower, upper = self.images
+        return Boxes.of(lower, upper, region)
 
     @cached_property
     def images(self) -> tuple[Ints, Floats, Floats]:

@@ -110,9 +110,14 @@ def rollout(
         (..., K * substeps + 1, n) states, not wrapped: the path of a periodic dimension is
         continuous.
     """
-    controls = np.asarray(controls, dtype=float)
-    states = [np.asarray(start, dtype=float)]
-    for k in range(controls.shape[-2]):
-        for _ in range(substeps):
-            states.append(step(system, states[-1], controls[..., k, :], dt / substeps))
-    return np.stack(np.broadcast_arrays(*states), axis=-2)
+    controls, start = np.asarray(controls, dtype=float), np.asarray(start, dtype=float)
+    # Each dimension is contiguous: numpy is slow along an axis as short as that of dimensions.
+    states = np.moveaxis(np.ascontiguousarray(np.moveaxis(start, -1, 0)), 0, -1)
+    batch = np.broadcast_shapes(start.shape[:-1], controls.shape[:-2])
+    path = np.empty((controls.shape[-2] * substeps + 1, start.shape[-1], *batch))
+    path[0] = np.moveaxis(states, -1, 0)
+    for number in range(1, len(path)):
+        control = controls[..., (number - 1) // substeps, :]
+        states = step(system, states, control, dt / substeps)
+        path[number] = np.moveaxis(states, -1, 0)
+    return np.moveaxis(path, (0, 1), (-2, -1))

@@ -142,8 +142,15 @@ class StateSpace:
     def contains(self, states: ArrayLike) -> Bools:
         """Whether states (..., n) lie in the bounds; periodic dimensions take any finite value."""
         states = np.asarray(states)
-        inside = (states >= self.bounds.lower) & (states <= self.bounds.upper)
-        return np.all(inside | (self.periodic & np.isfinite(states)), axis=-1)
+        inside: Bools = np.asarray(True)
+        # One dimension after the other: numpy is slow along so short an axis.
+        for d, (lower, upper) in enumerate(zip(self.bounds.lower, self.bounds.upper, strict=True)):
+            along = states[..., d]
+            if self.periodic[d]:
+                inside = inside & np.isfinite(along)
+            else:
+                inside = inside & (along >= lower) & (along <= upper)
+        return inside
 
     def excess(self, states: ArrayLike, region: Box) -> Floats:
         """How far each dimension of states (..., n) is outside `region`: signed, 0 inside.

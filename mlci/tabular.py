@@ -35,6 +35,7 @@ from mlci.systems import System
 
 _CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the curve it stands for
 _MOVES_AT_ONCE = 1 << 17  # what a step of long work holds beside its result: about 100 MB
+_PATHS_AT_ONCE = 1 << 13  # which the second level of cache nearly holds
 
 # Called with how many parts of long work are done, and of how many.
 Progress = Callable[[int, int], None]
@@ -235,7 +236,7 @@ def discretize(
     control_of = np.repeat(actions, points, axis=0)  # (M, m) the control of each move
     successor, reward = np.empty(shape, dtype=np.int64), np.empty(shape)
     crosses = []
-    size = max(1, _MOVES_AT_ONCE // (shape[1] * substeps))
+    size = max(1, _PATHS_AT_ONCE // shape[1])
     for first in range(0, grid.size, size):
         block = slice(first, min(first + size, grid.size))
         inside = grid.points_inside(samples, block)
@@ -289,9 +290,5 @@ def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int
 def follow(grid: Grid, regions: Regions, path: Floats) -> tuple[Ints, sparse.csr_matrix]:
     """Successor (-1 where the path leaves the space) and crossings of paths (Q, K+1, n)."""
     stays = np.all(grid.space.contains(path), axis=-1)
-    successor = np.full(len(path), -1, dtype=np.int64)
-    successor[stays] = grid.index(path[stays, -1])
-    chords = path[stays, :-1], np.diff(path[stays], axis=1)
-    owner = np.repeat(np.flatnonzero(stays), path.shape[1] - 1)
-    flat = [part.reshape(-1, path.shape[-1]) for part in chords]
-    return successor, regions.crossings(flat[0], flat[1], owner, len(path))
+    successor = np.where(stays, grid.index(path[:, -1]), -1)
+    return successor, regions.crossings(path[:, :-1], np.diff(path, axis=1), stays)

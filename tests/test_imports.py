@@ -16,9 +16,11 @@ PACKAGES = ("mlci", "experiments", "paper_figures")
 # A module of mlci, and what stands directly below it. It may import that, and all that is below
 # that. A package's name stands for its modules, which may import each other.
 MLCI = {
+    "mlci.compiled": "",
     "mlci.spaces": "",
     "mlci.grids": "mlci.spaces",
-    "mlci.regions": "mlci.grids",
+    "mlci.chords": "mlci.compiled mlci.spaces",
+    "mlci.regions": "mlci.chords mlci.grids",
     "mlci.crossings": "mlci.regions",
     "mlci.differences": "mlci.spaces",
     "mlci.systems": "mlci.differences",
@@ -39,7 +41,6 @@ MLCI = {
     "mlci.tabular": "mlci.merged_moves mlci.regions mlci.simulate",
     "mlci.diagnosis": "mlci.tabular",
     "mlci.end_moves": "mlci.tabular",
-    "mlci.compiled": "",
     "mlci.recursions": "mlci.compiled mlci.tabular",
     "mlci.maxent": "mlci.end_moves mlci.recursions mlci.demonstrations",
     "mlci.evidence": "mlci.spaces",

@@ -3,7 +3,6 @@ import itertools
 import numpy as np
 import pytest
 
-from mlci import regions as constraints
 from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 
@@ -144,25 +143,56 @@ def test_a_path_of_one_sample_is_a_point():
     np.testing.assert_array_equal(square.violated_by(points[:, None, :]), expected)
 
 
-def test_chords_count_for_their_owner_in_blocks_of_any_size(monkeypatch):
+def test_a_path_crosses_what_some_chord_of_it_meets():
+    """And one that is not tested crosses nothing."""
     rng = np.random.default_rng(2)
     region_set = Regions.from_grid(CYLINDER, (8, 6))
-    starts = rng.uniform([0, -6], [TURN, 6], size=(90, 2))
-    steps = rng.normal(scale=0.5, size=(90, 2))
-    owner = rng.integers(0, 12, size=90)
-    each = region_set.violated_by(np.stack([starts, starts + steps], axis=1))
-    expected = [each[owner == row].any(axis=0) for row in range(13)]
-    for block in (90, 7):
-        monkeypatch.setattr(constraints, "_CHORDS_AT_ONCE", block)
-        gathered = region_set.crossings(starts, steps, owner, 13)
-        np.testing.assert_array_equal(gathered.toarray(), expected)
+    starts = rng.uniform([0, -6], [TURN, 6], size=(30, 3, 2))
+    steps = rng.normal(scale=0.5, size=(30, 3, 2))
+    each = region_set.violated_by(np.stack([starts, starts + steps], axis=-2))
+    gathered = region_set.crossings(starts, steps)
+    assert gathered.has_sorted_indices
+    np.testing.assert_array_equal(gathered.toarray(), each.any(axis=1))
+    tested = rng.random(30) < 0.5
+    some = region_set.crossings(starts, steps, tested)
+    np.testing.assert_array_equal(some.toarray(), each.any(axis=1) & tested[:, None])
+
+
+def test_boxes_of_all_sizes_are_found_in_their_buckets():
+    """Against every chord with every box, one dimension of one box at a time."""
+    rng = np.random.default_rng(5)
+    lower = rng.uniform([-1, -7, -4], [6, 5, 3], size=(400, 3))
+    upper = lower + 10 ** rng.uniform(-3, 0.7, size=(400, 3))
+    for d in range(3):
+        free = rng.random(400) < 0.3
+        lower[free, d], upper[free, d] = -np.inf, np.inf
+    space = StateSpace(Box([0.0, -6.0, -3.0], [TURN, 6.0, 3.0]), [True, False, False], tuple("abc"))
+    region_set = Regions(space, lower, upper)
+    starts = rng.uniform([0, -6, -3], [TURN, 6, 3], size=(60, 3))
+    ends = starts + rng.normal(scale=[0.5, 2.0, 0.2], size=(60, 3))
+    expected = np.zeros((60, 400), dtype=bool)
+    for turns in (-2, -1, 0, 1, 2):
+        shift = np.array([turns * TURN, 0.0, 0.0])
+        for chord, (start, end) in enumerate(zip(starts + shift, ends + shift, strict=True)):
+            for box in range(400):
+                enter, leave = 0.0, 1.0
+                for d in range(3):
+                    sides = np.array([lower[box, d], upper[box, d]])
+                    times = np.sort((sides - start[d]) / (end[d] - start[d]))
+                    enter, leave = max(enter, times[0]), min(leave, times[1])
+                expected[chord, box] |= enter < leave
+    found = region_set.violated_by(np.stack([starts, ends], axis=1))
+    assert 500 < np.sum(expected) < 20000
+    np.testing.assert_array_equal(found, expected)
 
 
 def test_no_chords_cross_nothing():
     region_set = Regions.from_grid(CYLINDER, (2, 2))
-    nothing = region_set.crossings(np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=int), 3)
+    nothing = region_set.crossings(np.empty((3, 0, 2)), np.empty((3, 0, 2)))
     assert nothing.shape == (3, 4)
     assert nothing.nnz == 0
+    nowhere = Regions.from_boxes(CYLINDER, []).violated_by(np.zeros((5, 4, 2)))
+    assert nowhere.shape == (5, 0)
 
 
 def test_a_grid_of_regions_covers_every_point_once():

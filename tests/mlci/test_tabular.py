@@ -151,7 +151,7 @@ def test_blocks_of_cells_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) ->
         Regions.from_grid(system.space, (5, 5)),
     )
     whole = discretize(*arguments, samples=2)
-    monkeypatch.setattr("mlci.tabular._MOVES_AT_ONCE", 50)
+    monkeypatch.setattr("mlci.tabular._PATHS_AT_ONCE", 50)
     told: list[tuple[int, int]] = []
     pieces = discretize(*arguments, samples=2, progress=lambda *count: told.append(count))
     np.testing.assert_array_equal(whole.successor, pieces.successor)
