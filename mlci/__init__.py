@@ -28,10 +28,12 @@ V       values                safe set's value function                  unit of
 """
 
 from mlci.calibration import Calibration, calibrate
+from mlci.causal_entropy import CausalEntropy
 from mlci.crossings import Crossing
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.diagnosis import Diagnosis, diagnose
+from mlci.first_exit import FirstExit
 from mlci.forecasts import ForecastMap
 from mlci.grids import Grid
 from mlci.inference import Inference
@@ -42,6 +44,7 @@ from mlci.recordings.read import read_demonstrations
 from mlci.recordings.write import write_demonstration
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter
+from mlci.selection import Selection, select_constraints
 from mlci.simulate import rollout
 from mlci.spaces import Box, StateSpace
 from mlci.system_check import check_affine, check_system
@@ -52,15 +55,18 @@ from mlci.systems import (
     System,
     TelescopingPendulum,
 )
+from mlci.tables import Table, TablePath, TableRegion
 from mlci.tabular import TabularModel, action_grid, discretize
 
 __all__ = [
     "Box",
     "Calibration",
+    "CausalEntropy",
     "Crossing",
     "Demonstration",
     "Diagnosis",
     "DoubleIntegrator",
+    "FirstExit",
     "ForecastMap",
     "FunctionSystem",
     "Grid",
@@ -70,8 +76,12 @@ __all__ = [
     "Regions",
     "SafeSet",
     "SafetyFilter",
+    "Selection",
     "StateSpace",
     "System",
+    "Table",
+    "TablePath",
+    "TableRegion",
     "TabularModel",
     "Task",
     "TelescopingPendulum",
@@ -88,6 +98,7 @@ __all__ = [
     "read_demonstrations",
     "rollout",
     "sample_trials",
+    "select_constraints",
     "solve_safe_set",
     "write_demonstration",
 ]

@@ -1,0 +1,49 @@
+"""What goes along the edges of a graph of states: who is reached, and sums over all ways."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from mlci.spaces import Bools, Floats, Ints
+
+_POWERS = 200  # steps of a power iteration whose result a message names
+
+
+def reached(seeds: Ints, begin: Ints, end: Ints, states: int) -> Bools:
+    """(S,) the states that edges from `begin` (L,) to `end` (L,) lead to from some seeds."""
+    marked = np.zeros(states, dtype=bool)
+    marked[seeds] = True
+    for _ in range(states):
+        before = np.count_nonzero(marked)
+        marked[end[marked[begin]]] = True
+        if np.count_nonzero(marked) == before:
+            break
+    return marked
+
+
+def fixed_point(flow: sparse.csr_matrix, source: Floats) -> Floats:
+    """The x (S,) with x = flow x + source; nan where the system is singular.
+
+    No flow is negative. With pivots on the diagonal alone, elimination then adds numbers of one
+    sign, so that each x of sources >= 0 keeps its digits beside others that are far larger.
+    """
+    if not len(source):
+        return np.empty(0)
+    system = sparse.identity(len(source), format="csc") - flow
+    order = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}}
+    try:
+        return np.asarray(splu(system.tocsc(), diag_pivot_thresh=0.0, **order).solve(source))
+    except RuntimeError:  # singular
+        return np.full(len(source), np.nan)
+
+
+def spectral_radius(flow: sparse.csr_matrix) -> float:
+    """About the spectral radius of a flow (S, S) of numbers >= 0, by power iteration."""
+    vector, growth = np.ones(flow.shape[0]), 0.0
+    for _ in range(_POWERS):  # of (I + flow) / 2, since the flow itself may be periodic
+        vector = (vector + flow @ vector) / 2
+        growth = float(np.max(vector))
+        vector /= growth
+    return 2 * growth - 1

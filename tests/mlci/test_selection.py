@@ -1,0 +1,119 @@
+"""Greedy selection against the published sequence, and against sums over all trajectories."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from toy_tables import grid_world, published_grid
+
+from mlci.first_exit import FirstExit
+from mlci.selection import select_constraints
+from mlci.tables import Table, TablePath, TableRegion
+
+# Scobee and Sastry's demonstration, and KL after each constraint that their code adds.
+ACTIONS = [2, 2, 2, 2, 2, 1, 2, 1, 7, 7, 7, 7, 7, 7]
+PUBLISHED = {
+    "action 5": 24.623707798,
+    "green": 16.706309105,
+    "state 31": 12.055524120,
+    "state 39": 7.661890326,
+    "state 47": 2.724126394,
+    "state 37": 1.513969539,
+    "state 54": 0.862539251,
+    "action 3": 0.402498614,
+    "action 4": 0.054855427,
+}
+
+
+def test_published_sequence() -> None:
+    table = published_grid()
+    selection = select_constraints(table, [table.path(0, ACTIONS)], least=0.1)
+    frame = selection.to_frame()
+    assert frame["hypothesis"].tolist() == list(PUBLISHED)
+    np.testing.assert_allclose(frame["kl"], list(PUBLISHED.values()), atol=1e-8)
+    assert selection.kl[0] == pytest.approx(4 * 14 - 25.937183169, abs=1e-8)
+    assert 0 < selection.next_decrease <= 0.1
+    assert set(np.flatnonzero(selection.mask)) == set(selection.added)
+
+
+def small() -> tuple[Table, list[TablePath]]:
+    """A 4 x 4 grid whose hypotheses are its states, and three paths round it, two of them alike."""
+    regions = {f"state {s}": TableRegion(states=[s]) for s in range(16)}
+    table = grid_world(4, goal=15, reward=-3.0, regions=regions)
+    paths = [table.path(0, actions) for actions in ([2, 2, 2, 1, 1, 1], [2, 2, 5, 1, 1])]
+    return table, [*paths, paths[0]]
+
+
+def divergence(table: Table, paths: list[TablePath]) -> float:
+    """sum of p log(p / q) over the different paths, from the equation."""
+    keys = [tuple(path.actions) for path in paths]
+    log_z, total = FirstExit(table).log_z, 0.0
+    for key in set(keys):
+        path, share = paths[keys.index(key)], keys.count(key) / len(keys)
+        reward = sum(table.reward[s, a] for s, a in zip(path.states, path.actions, strict=False))
+        total += share * (np.log(share) - reward + log_z[path.states[0]])
+    return total
+
+
+def test_each_step_is_the_best_of_all_and_the_last_one_too_small() -> None:
+    table, paths = small()
+    crossed = np.any([table.crossed_by(path) for path in paths], axis=0)
+    selection = select_constraints(table, paths, least=0.02)
+    assert len(selection.added) >= 2
+    mask = np.zeros(len(crossed), dtype=bool)
+    for k, i in enumerate([*selection.added, -1]):
+        assert selection.kl[k] == pytest.approx(divergence(table.under(mask), paths), abs=1e-12)
+        rest = np.flatnonzero(~crossed & ~mask)
+        trials = [mask | (np.arange(len(mask)) == j) for j in rest]
+        after = [divergence(table.under(trial), paths) for trial in trials]
+        if i < 0:
+            assert selection.kl[k] - min(after, default=np.inf) <= 0.02
+        else:
+            assert i == rest[np.argmin(after)]
+            mask[i] = True
+
+
+def test_it_stops_at_the_most() -> None:
+    table, paths = small()
+    everything = select_constraints(table, paths, least=0.02)
+    one = select_constraints(table, paths, least=0.02, most=1)
+    assert one.added.tolist() == everything.added[:1].tolist()
+    assert one.next_decrease == pytest.approx(everything.kl[1] - everything.kl[2])
+
+
+def test_with_nothing_left_the_next_decrease_is_0() -> None:
+    table, paths = small()
+    everything = select_constraints(table, paths, least=-np.inf)
+    crossed = np.any([table.crossed_by(path) for path in paths], axis=0)
+    assert set(everything.added) == set(np.flatnonzero(~crossed))
+    assert everything.next_decrease == 0
+
+
+def test_of_equal_hypotheses_the_first_is_taken() -> None:
+    table, paths = small()
+    names = list(table.regions)
+    first = names[select_constraints(table, paths, least=0.02).added[0]]
+    twice = Table.from_arrays(
+        table.successor, -3.0, 0, 15, {**table.regions, "copy": table.regions[first]}
+    )
+    assert names[select_constraints(twice, paths, least=0.02).added[0]] == first
+
+
+@pytest.mark.parametrize(
+    ("states", "actions", "message"),
+    [
+        ([1, 2], [1], "path 'walk' starts in 1, where the table does not"),
+        ([0, 1], [1], r"path 'walk' ends in 1, which is none of the goals \[2\]"),
+    ],
+)
+def test_a_path_from_elsewhere_is_refused(
+    states: list[int], actions: list[int], message: str
+) -> None:
+    table = Table.from_arrays([[-1, 1], [0, 2], [-1, -1]], -1.0, 0, 2)
+    with pytest.raises(ValueError, match=message):
+        select_constraints(table, [TablePath(np.array(states), np.array(actions), "walk")])
+
+
+def test_no_paths_select_nothing() -> None:
+    with pytest.raises(ValueError, match="selected by paths, and there are none"):
+        select_constraints(published_grid(), [])
