@@ -34,6 +34,7 @@ from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.first_exit import FirstExit
+from mlci.fixed_horizon import FixedHorizon
 from mlci.forecasts import ForecastMap
 from mlci.grids import Grid
 from mlci.inference import Inference
@@ -67,6 +68,7 @@ __all__ = [
     "Diagnosis",
     "DoubleIntegrator",
     "FirstExit",
+    "FixedHorizon",
     "ForecastMap",
     "FunctionSystem",
     "Grid",

@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 
 from mlci.first_exit import FirstExit
+from mlci.fixed_horizon import FixedHorizon
 from mlci.spaces import Bools, Floats, Ints
 from mlci.tables import Table, TablePath
 
@@ -59,34 +60,50 @@ class Selection:
 
 
 def select_constraints(
-    table: Table, paths: Iterable[TablePath], least: float = 0.1, most: int | None = None
+    table: Table,
+    paths: Iterable[TablePath],
+    least: float = 0.1,
+    *,
+    most: int | None = None,
+    steps: int | None = None,
 ) -> Selection:
     """Add one hypothesis of a table after the other, as long as each explains enough.
 
     Args:
-        table: a world whose moves are certain, with hypotheses; trajectories end at first exit.
+        table: a world whose moves are certain, with hypotheses.
         paths: what demonstrators did, from a start to a goal.
         least: d_KL; a hypothesis that lowers KL by no more is not added [nat].
         most: how many to add at most; by default as many as there are.
+        steps: the horizon of `mlci.fixed_horizon`; None takes trajectories of any length, those of
+            `mlci.first_exit`. A horizon is faster where there are many hypotheses.
 
     Raises:
         ValueError: no paths, a path that does not run from a start to its first goal by moves of
-            the table, or a sum over trajectories that diverges.
+            the table, or within the horizon; or a sum over trajectories that diverges.
     """
     paths = list(paths)
-    starts = _starts(table, paths)
+    starts = _starts(table, paths, steps)
     feasible = ~np.any([table.crossed_by(path) for path in paths], axis=0)
 
     def mean_log_z(mask: Bools) -> float:
-        return float(np.mean(FirstExit(table.under(mask)).log_z[starts]))
+        constrained = table.under(mask)
+        if steps is not None:
+            return float(np.mean(FixedHorizon(constrained, steps).log_z[0, starts]))
+        return float(np.mean(FirstExit(constrained).log_z[starts]))
 
     def decreases(mask: Bools, candidates: Ints) -> Floats:
+        if steps is not None:
+            distribution = FixedHorizon(table.under(mask), steps)
+            alpha = [distribution.avoidance_probabilities(start) for start in starts.tolist()]
+            return np.asarray(-np.mean(np.log(np.array(alpha)[:, candidates]), axis=0))
         now, each = mean_log_z(mask), np.eye(len(mask), dtype=bool)[candidates]
         return np.array([now - mean_log_z(mask | one) for one in each])
 
-    added, steps, following = greedy(decreases, feasible, least, most)
+    added, decrease, following = greedy(decreases, feasible, least, most)
     kl = _divergence(table, paths) + mean_log_z(np.zeros(len(feasible), dtype=bool))
-    return Selection(tuple(table.regions), added, kl - np.cumsum(np.append(0.0, steps)), following)
+    return Selection(
+        tuple(table.regions), added, kl - np.cumsum(np.append(0.0, decrease)), following
+    )
 
 
 def greedy(
@@ -118,7 +135,7 @@ def greedy(
     return np.array(added, dtype=np.int64), np.array(steps), 0.0
 
 
-def _starts(table: Table, paths: Sequence[TablePath]) -> Ints:
+def _starts(table: Table, paths: Sequence[TablePath], steps: int | None) -> Ints:
     """(N,) the first states of some paths, all of which do what a table's trajectories do."""
     if not paths:
         raise ValueError("constraints are selected by paths, and there are none")
@@ -126,7 +143,10 @@ def _starts(table: Table, paths: Sequence[TablePath]) -> Ints:
         table.moves_of(path)
         if not table.start[path.states[0]] > 0:
             raise ValueError(f"{path.title} starts in {path.states[0]}, where the table does not")
-        if path.states[-1] not in table.goals:
+        moves = len(path.actions)
+        if steps is not None and (moves > steps or (moves < steps and not len(table.goals))):
+            raise ValueError(f"{path.title} has {moves} moves, the horizon {steps}")
+        if path.states[-1] not in table.goals and (steps is None or len(table.goals)):
             raise ValueError(
                 f"{path.title} ends in {path.states[-1]}, which is none of the goals "
                 f"{table.goals.tolist()}"

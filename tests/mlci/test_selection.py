@@ -117,3 +117,20 @@ def test_a_path_from_elsewhere_is_refused(
 def test_no_paths_select_nothing() -> None:
     with pytest.raises(ValueError, match="selected by paths, and there are none"):
         select_constraints(published_grid(), [])
+
+
+def test_a_long_horizon_selects_what_first_exit_does() -> None:
+    table, paths = small()
+    any_length = select_constraints(table, paths, least=0.02)
+    horizon = select_constraints(table, paths, least=0.02, steps=200)
+    assert horizon.added.tolist() == any_length.added.tolist()
+    np.testing.assert_allclose(horizon.kl, any_length.kl, atol=1e-9)
+    assert horizon.next_decrease == pytest.approx(any_length.next_decrease, abs=1e-9)
+
+
+@pytest.mark.parametrize(("goals", "steps"), [([15], 5), ([], 5), ([], 7)])
+def test_a_path_beyond_the_horizon_is_refused(goals: list[int], steps: int) -> None:
+    table, paths = small()
+    table = Table.from_arrays(table.successor, -3.0, 0, goals, table.regions)
+    with pytest.raises(ValueError, match=f"a path has 6 moves, the horizon {steps}"):
+        select_constraints(table, paths, steps=steps)
