@@ -72,20 +72,21 @@ class Diagnosis:
 def diagnose(model: TabularModel) -> Diagnosis:
     """Measure how a tabular model moves; see `Diagnosis`."""
     grid, actions = model.grid, model.actions
-    stays, crossed, changing = 0, 0.0, np.zeros(len(grid.shape))
+    stays, taken, crossed, changing = 0, 0, 0.0, np.zeros(len(grid.shape))
     for block in model.blocks():
-        cell = np.arange(block.start, block.stop)[:, None]
+        moves, cell = model.moves_of(block), block[:, None]
         speed = np.abs(model.system.dynamics(grid.centers[block, None, :], actions[None, :, :]))
         crossed += float(np.sum(np.max(speed * model.dt / grid.widths, axis=-1)))
-        successor, allowed = model.successor[block], model.allowed[block]
+        successor, allowed = moves.successor, moves.allowed(model.truth)
+        taken += int(np.sum(allowed))
         stays += int(np.sum((successor == cell) & allowed))
         there = np.stack(np.unravel_index(np.maximum(successor, 0), grid.shape), axis=-1)
         here = np.stack(np.unravel_index(cell, grid.shape), axis=-1)
         changing += np.sum(np.any((there != here) & allowed[..., None], axis=1), axis=0)
-    moves = int(np.sum(model.allowed))
+    count = model.states * model.moves
     return Diagnosis(
-        stay=stays / moves if moves else np.nan,
-        leave=(model.allowed.size - moves) / model.allowed.size,
+        stay=stays / taken if taken else np.nan,
+        leave=(count - taken) / count,
         cells_crossed=crossed / (grid.size * len(actions)),
         frozen=tuple(float(share) for share in (grid.size - changing) / grid.size),
         noise=tuple(_noise(model).tolist()),

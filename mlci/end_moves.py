@@ -24,26 +24,28 @@ def first_moves(model: TabularModel, start: Floats) -> MergedMoves:
 def last_moves(model: TabularModel, cells: Ints, goal_cells: Ints, goal: Box) -> MergedMoves:
     """The moves from some cells, in order, into the goal's cells, bent to end in the goal."""
     # Whether the truth allows a move is seen on the bent path.
-    row, move = np.nonzero(np.isin(model.successor[cells], goal_cells))
+    cells = np.intersect1d(cells, model.merged.cells_into(goal_cells))
+    moves = model.moves_of(cells)
+    row, move = np.nonzero(np.isin(moves.successor, goal_cells))
     cell = cells[row]
     origin, action = model.move_origins(cell, move), model.actions[model.action[move]]
     path = rollout(model.system, origin, action[:, None, :], model.dt, model.substeps)
-    return _allowed(model, cell, move, _bent(model, path, goal), model.reward[cell, move])
+    return _allowed(model, cell, _bent(model, path, goal), moves.reward[row, move])
 
 
 def only_moves(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> MergedMoves:
     """The moves of a trajectory of one step: from a state into the goal region."""
-    cell, action, path, reward = _from_state(model, start)
+    cell, path, reward = _from_state(model, start)
     into = np.isin(model.grid.index(path[:, -1]), goal_cells)
-    return _allowed(model, cell[into], action[into], _bent(model, path[into], goal), reward[into])
+    return _allowed(model, cell[into], _bent(model, path[into], goal), reward[into])
 
 
-def _from_state(model: TabularModel, start: Floats) -> tuple[Ints, Ints, Floats, Floats]:
-    """The cell, action (A,), path (A, K+1, n) and reward (A,) of all actions from a state (n,)."""
+def _from_state(model: TabularModel, start: Floats) -> tuple[Ints, Floats, Floats]:
+    """The cell (A,), path (A, K+1, n) and reward (A,) of all actions from a state (n,)."""
     origin = np.broadcast_to(start, (len(model.actions), len(start)))
     path = rollout(model.system, origin, model.actions[:, None, :], model.dt, model.substeps)
     cell = np.full(len(origin), model.grid.index(start))
-    return cell, np.arange(len(origin)), path, model.move_reward(origin, model.actions)
+    return cell, path, model.move_reward(origin, model.actions)
 
 
 def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
@@ -53,9 +55,7 @@ def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
     return path - share * beyond[:, None, :]
 
 
-def _allowed(
-    model: TabularModel, cell: Ints, move: Ints, path: Floats, reward: Floats
-) -> MergedMoves:
+def _allowed(model: TabularModel, cell: Ints, path: Floats, reward: Floats) -> MergedMoves:
     """The moves with paths (L, K+1, n), in order of cell; those that leave the space or cross the
     truth are forbidden. None is merged with another.
     """
@@ -64,7 +64,6 @@ def _allowed(
     return MergedMoves(
         begins=np.searchsorted(cell, np.arange(model.states + 1)),
         successor=np.where(forbidden, 0, successor).astype(np.int32),
-        move=move,
         log_weight=np.where(forbidden, -np.inf, reward),
         crossing_begins=crosses.indptr.astype(np.int64),
         crossing_region=crosses.indices.astype(np.int32),

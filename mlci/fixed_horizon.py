@@ -98,7 +98,6 @@ class FixedHorizon:
             MergedMoves(
                 begins=_begins(moves.sum(axis=1)),
                 successor=successor[moves].astype(np.int32),
-                move=row % table.actions,
                 log_weight=reward[moves],
                 crossing_begins=_begins(count),
                 crossing_region=regions.astype(np.int32),

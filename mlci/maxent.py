@@ -169,7 +169,8 @@ class TrajectoryDistribution:
             moves, whose rows sum to 1.
         """
         cells = np.flatnonzero(self.log_z[t] > -np.inf)
-        return cells, move_probabilities(self.model, self.log_z, t, cells)
+        moves = self.model.moves_of(cells)
+        return cells, move_probabilities(moves, self.model.truth, self.log_z, t, cells)
 
     def avoidance_probabilities(self) -> Floats:
         """alpha_i (C,): the probability that a trajectory does not cross region i.
@@ -204,17 +205,21 @@ class TrajectoryDistribution:
         cells = [np.full(count, self.start, dtype=np.int64)]
         moves = []
         for t in range(self.steps):
-            moves.append(self.draw_moves(t, cells[-1], rng))
-            cells.append(self.model.successor[cells[-1], moves[-1]])
+            move, successor = self.draw_moves(t, cells[-1], rng)
+            moves.append(move)
+            cells.append(successor)
         return np.stack(cells, axis=1), np.stack(moves, axis=1)
 
-    def draw_moves(self, t: int, cells: Ints, rng: np.random.Generator) -> Ints:
-        """(B,) for each of some cells (B,) at step t, one of its moves, by the soft policy."""
+    def draw_moves(self, t: int, cells: Ints, rng: np.random.Generator) -> tuple[Ints, Ints]:
+        """A move of each of some cells (B,) at step t by the soft policy, and its successor."""
         here, place = np.unique(cells, return_inverse=True)
-        cumulative = np.cumsum(move_probabilities(self.model, self.log_z, t, here), axis=1)[place]
+        moves = self.model.moves_of(here)
+        probabilities = move_probabilities(moves, self.model.truth, self.log_z, t, here)
+        cumulative = np.cumsum(probabilities, axis=1)[place]
         # Scaled by the last entry, so that rounding cannot lift a draw past every move.
         draws = rng.random(len(cells))[:, None] * cumulative[:, -1:]
-        return np.argmax(cumulative > draws, axis=1)
+        move = np.argmax(cumulative > draws, axis=1)
+        return move, moves.successor[place, move]
 
     def _require_possible(self, consequence: str) -> None:
         """Raise where there is no distribution."""

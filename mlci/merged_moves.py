@@ -7,13 +7,14 @@ where it has one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
+from mlci.compiled import compiled
+from mlci.single_moves import SingleMoves
 from mlci.spaces import Bools, Floats, Ints
 
 
@@ -24,7 +25,6 @@ class MergedMoves:
     Attributes:
         begins: (S+1,) those of cell s are begins[s] to begins[s+1].
         successor: (W,) cell that a merged move leads to.
-        move: (W,) one of its moves, which crosses what the others cross.
         log_weight: (W,) log of the sum of e^reward over its moves [nat]; -inf if it is forbidden.
         crossing_begins: (W+1,) the regions that merged move k crosses are crossing_region[i] for i
             from crossing_begins[k] to crossing_begins[k+1].
@@ -33,7 +33,6 @@ class MergedMoves:
 
     begins: Ints
     successor: Ints
-    move: Ints
     log_weight: Floats
     crossing_begins: Ints
     crossing_region: Ints
@@ -56,118 +55,105 @@ class MergedMoves:
             row[self.crossing_region[begin:end]] = True
         return crossed
 
-    def without(self, crossed: Bools) -> MergedMoves:
-        """The same with those forbidden whose moves are `crossed` (S, M)."""
-        cell = np.repeat(np.arange(len(crossed)), np.diff(self.begins))
-        weight = np.where(crossed[cell, self.move], -np.inf, self.log_weight)
+    def under(self, truth: Bools) -> MergedMoves:
+        """The same with those forbidden that cross the truth, a mask (C,) of regions."""
+        entry = np.flatnonzero(truth[self.crossing_region])
+        weight = self.log_weight.copy()
+        weight[np.searchsorted(self.crossing_begins, entry, side="right") - 1] = -np.inf
         return replace(self, log_weight=weight)
 
+    def cells_into(self, cells: Ints) -> Ints:
+        """Cells of which some move leads into one of some cells, forbidden or not; sorted."""
+        move = np.flatnonzero(np.isin(self.successor, cells))
+        return np.unique(np.searchsorted(self.begins, move, side="right") - 1)
 
-def merge_moves(
-    successor: Ints,
-    reward: Floats,
-    allowed: Bools,
-    crosses: sparse.csr_matrix,
-    blocks: Iterable[slice],
-) -> MergedMoves:
-    """Merge the allowed moves of each cell that have one successor and cross the same regions.
+
+def merge_moves(blocks: Iterable[SingleMoves]) -> MergedMoves:
+    """Merge the moves of each cell that have one successor and cross the same regions.
 
     Args:
-        successor, reward, allowed: (S, M) as of a TabularModel.
-        crosses: (S * M, C) which regions a move crosses.
-        blocks: of cells, in order, whose moves are held at once.
+        blocks: the moves of consecutive cells; one block is held at a time.
     """
-    moves = successor.shape[1]
     parts = []
     for block in blocks:
-        ends = crosses.indptr[block.start * moves : block.stop * moves + 1]
-        entries = crosses.indices[ends[0] : ends[-1]]
+        crosses = block.crosses
+        crosses.sort_indices()
+        begins, region = crosses.indptr.astype(np.int64), crosses.indices.astype(np.int32)
+        cells, first, log_weight = _merge(block.successor, block.reward, begins, region)
+        chosen = crosses[first]
         parts.append(
-            _merge_block(successor[block], reward[block], allowed[block], entries, ends - ends[0])
+            {
+                "begins": np.diff(cells),
+                "successor": block.successor.ravel()[first],
+                "log_weight": log_weight,
+                "crossing_begins": np.diff(chosen.indptr),
+                "crossing_region": chosen.indices.astype(np.int32),
+            }
         )
-    return _concatenated(parts)
+    arrays: dict[str, Any] = {}
+    for name in list(parts[0]):  # each set of parts goes before the next is joined
+        arrays[name] = np.concatenate([part.pop(name) for part in parts])
+        if name.endswith("begins"):
+            arrays[name] = np.append(0, np.cumsum(arrays[name], dtype=np.int64))
+    return MergedMoves(**arrays)
 
 
-def _merge_block(
-    successor: Ints, reward: Floats, allowed: Bools, entries: Ints, ends: Ints
-) -> MergedMoves:
-    """The merged moves of some cells (Q, M); move k of them crosses entries[ends[k]:ends[k+1]]."""
+@compiled("b1(i8[::1], i4[::1], i8, i8)")
+def _alike(begins: Ints, region: Ints, one: int, other: int) -> bool:
+    """Whether two moves cross the same regions: region[begins[k]:begins[k + 1]] of each, sorted."""
+    count = begins[one + 1] - begins[one]
+    if count != begins[other + 1] - begins[other]:
+        return False
+    same = True
+    for i in range(count):
+        same &= region[begins[one] + i] == region[begins[other] + i]
+    return same
+
+
+@compiled("Tuple((i8[::1], i8[::1], f8[::1]))(i4[:, ::1], f8[:, ::1], i8[::1], i4[::1])")
+def _merge(successor, reward, begins, region):  # type: ignore[no-untyped-def]
+    """The merged moves of Q cells: where each cell's begin (Q+1,), and of each the number of its
+    first move, q M + move, and the log of the sum of e^reward over its moves.
+
+    Args:
+        successor, reward: (Q, M).
+        begins, region: what move q M + move crosses, as of `_alike`.
+    """
     cells, moves = successor.shape
-    order, begins = _groups(successor, allowed, entries, ends)
-    row = (order + np.arange(cells)[:, None] * moves).ravel()  # numbers of the moves, in order
-    first = np.flatnonzero(begins)  # of each merged move, the place of its first move in that order
-    cell, move = np.divmod(row[first], moves)
-    # What the first move crosses, all of a merged move cross.
-    count = ends[row[first] + 1] - ends[row[first]]
-    entry = np.arange(np.sum(count)) + np.repeat(ends[row[first]] - np.cumsum(count) + count, count)
-    return MergedMoves(
-        begins=_begins(np.bincount(cell, minlength=cells)),
-        successor=successor.ravel()[row[first]].astype(np.int32),
-        move=move.astype(np.min_scalar_type(moves)),
-        log_weight=_log_sums(np.where(allowed, reward, -np.inf).ravel()[row], first),
-        crossing_begins=_begins(count),
-        crossing_region=entries[entry].astype(np.int32),
-    )
-
-
-def _concatenated(parts: Sequence[MergedMoves]) -> MergedMoves:
-    """The merged moves of consecutive blocks of cells as those of all."""
-
-    def joined(name: str) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    def begins(name: str) -> Ints:
-        return _begins(np.concatenate([np.diff(getattr(part, name)) for part in parts]))
-
-    return MergedMoves(
-        begins=begins("begins"),
-        successor=joined("successor"),
-        move=joined("move"),
-        log_weight=joined("log_weight"),
-        crossing_begins=begins("crossing_begins"),
-        crossing_region=joined("crossing_region"),
-    )
-
-
-def _begins(counts: Ints) -> Ints:
-    """(Q+1,) where each of Q runs begins in an array of all, and where the last one ends."""
-    return np.append(0, np.cumsum(counts)).astype(np.int64)
-
-
-def _groups(successor: Ints, allowed: Bools, entries: Ints, ends: Ints) -> tuple[Ints, Bools]:
-    """An order (S, M) of each cell's moves in which those alike are neighbours, and where each
-    group begins; what is not allowed comes last and belongs to no group.
-
-    Moves are compared by 64 bits of their successor and regions. That two which differ agree in all
-    bits has a chance below 1e-11 for any cell of a grid of a million with 15 moves each.
-    """
-    summed = np.append(np.uint64(0), np.cumsum(_scrambled(entries, 1), dtype=np.uint64))
-    sign = (summed[ends[1:]] - summed[ends[:-1]]).reshape(successor.shape)
-    sign = (sign + _scrambled(successor, 2)) >> np.uint64(1)
-    sign = np.where(allowed, sign, np.iinfo(np.uint64).max)
-    order = np.argsort(sign, axis=1, kind="stable")
-    ordered = np.take_along_axis(sign, order, axis=1)
-    begins = np.ones(order.shape, dtype=bool)
-    begins[:, 1:] = ordered[:, 1:] != ordered[:, :-1]
-    return order, begins & np.take_along_axis(allowed, order, axis=1)
-
-
-def _scrambled(numbers: Ints, stream: int) -> np.ndarray:
-    """64 well mixed bits of each number (the finaliser of SplitMix64)."""
-    bits = (numbers.astype(np.uint64) + np.uint64(stream << 32)) * np.uint64(0x9E3779B97F4A7C15)
-    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return bits ^ (bits >> np.uint64(31))
-
-
-def _log_sums(values: Floats, first: Ints) -> Floats:
-    """log of the sum of e^value over each group, which begins at `first` and ends at the next.
-
-    The first value of a group is finite.
-    """
-    if not len(first):
-        return np.empty(0)
-    best = np.maximum.reduceat(values, first)
-    owner = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(values))))
-    shifted = np.exp(values[first[0] :] - best[owner])
-    return np.asarray(best + np.log(np.add.reduceat(shifted, first - first[0])))
+    ends = np.zeros(cells + 1, np.int64)
+    first = np.empty(cells * moves, np.int64)
+    best, total = np.empty(cells * moves), np.zeros(cells * moves)
+    merged = np.empty(moves, np.int64)  # merged move that each move of a cell belongs to
+    size = 1
+    while size < 2 * moves:
+        size *= 2
+    table = np.full(size, -1)  # merged moves of a cell, by a hash of successor and regions
+    count = 0
+    for cell in range(cells):
+        for move in range(moves):
+            number = cell * moves + move
+            if successor[cell, move] < 0:
+                continue
+            place = np.int64(successor[cell, move]) * 40503
+            for i in range(begins[number], begins[number + 1]):
+                place = (place ^ region[i]) * 16777619
+            place = (place ^ (place >> 15)) & (size - 1)
+            while table[place] >= 0:
+                other = first[table[place]]
+                if successor[cell, move] == successor[cell, other - cell * moves] and _alike(
+                    begins, region, number, other
+                ):
+                    break
+                place = (place + 1) & (size - 1)
+            if table[place] < 0:
+                table[place], first[count], best[count] = count, number, -np.inf
+                count += 1
+            merged[move] = table[place]
+            best[merged[move]] = max(best[merged[move]], reward[cell, move])
+        for move in range(moves):
+            if successor[cell, move] >= 0:
+                total[merged[move]] += np.exp(reward[cell, move] - best[merged[move]])
+        if ends[cell] < count:
+            table[:] = -1
+        ends[cell + 1] = count
+    return ends, first[:count].copy(), best[:count] + np.log(total[:count])

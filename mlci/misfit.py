@@ -15,7 +15,6 @@ import numpy as np
 from mlci.maxent import TrajectoryDistribution
 from mlci.merged_moves import MergedMoves
 from mlci.spaces import Bools, Floats, Ints
-from mlci.tabular import TabularModel
 
 SAMPLES = 249  # of each task: p of two sides is then 2 / 250 at least, which is below RARE
 RARE = 0.01  # a p below it is a warning
@@ -87,7 +86,7 @@ def sample_crossings(
     model, steps = distribution.model, distribution.steps
     if distribution.ends is None:
         path, taken = distribution.sample(count, rng)
-        return _crossed(model, path[:, :-1], taken)
+        return model.crossed(path[:, :-1], taken)
     if not distribution.is_possible:
         raise ValueError("no trajectory reaches a goal: nothing to sample")
     log_z, cell = distribution.log_z, np.full(count, distribution.start)
@@ -97,21 +96,14 @@ def sample_crossings(
     if steps == 1:
         return crossed
     for t in range(1, steps - 1):
-        moves.append(distribution.draw_moves(t, cells[-1], rng))
-        cells.append(model.successor[cells[-1], moves[-1]])
+        move, successor = distribution.draw_moves(t, cells[-1], rng)
+        moves.append(move)
+        cells.append(successor)
     if moves:
-        crossed |= _crossed(model, np.stack(cells[:-1], axis=1), np.stack(moves, axis=1))
+        crossed |= model.crossed(np.stack(cells[:-1], axis=1), np.stack(moves, axis=1))
     last = distribution.goal_moves
     move = _draw(last, log_z[steps], cells[-1], rng)
     return crossed | last.crosses(move, len(model.regions))
-
-
-def _crossed(model: TabularModel, cells: Ints, moves: Ints) -> Bools:
-    """(count, C) which regions moves (count, T) from cells (count, T) cross."""
-    hits = model.crosses[(cells * model.moves + moves).ravel()].tocoo()
-    crossed = np.zeros((len(cells), len(model.regions)), dtype=bool)
-    crossed[hits.row // cells.shape[1], hits.col] = True
-    return crossed
 
 
 def _draw(moves: MergedMoves, log_z_after: Floats, cell: Ints, rng: np.random.Generator) -> Ints:

@@ -15,8 +15,8 @@ import numpy as np
 
 from mlci.compiled import compiled
 from mlci.merged_moves import MergedMoves
+from mlci.single_moves import SingleMoves
 from mlci.spaces import Bools, Floats, Ints
-from mlci.tabular import TabularModel
 
 ALPHA_BYTES = 1 << 29  # of probabilities held at once, else regions go block by block
 
@@ -150,9 +150,11 @@ def _avoid(
                 here[i] /= total
 
 
-def move_probabilities(model: TabularModel, log_z: Floats, t: int, cells: Ints) -> Floats:
+def move_probabilities(
+    moves: SingleMoves, truth: Bools, log_z: Floats, t: int, cells: Ints
+) -> Floats:
     """(Q, M) probabilities of the moves of cells that carry probability at step t."""
-    value = model.reward[cells] + log_z[t + 1, model.successor[cells]]
-    value = np.where(model.allowed[cells], value, -np.inf)
+    value = moves.reward + log_z[t + 1, moves.successor]
+    value = np.where(moves.allowed(truth), value, -np.inf)
     probabilities = np.exp(value - log_z[t, cells, None])
     return np.asarray(probabilities / np.sum(probabilities, axis=1, keepdims=True))

@@ -115,7 +115,7 @@ def rollout(
     states = np.moveaxis(np.ascontiguousarray(np.moveaxis(start, -1, 0)), 0, -1)
     batch = np.broadcast_shapes(start.shape[:-1], controls.shape[:-2])
     path = np.empty((controls.shape[-2] * substeps + 1, start.shape[-1], *batch))
-    path[0] = np.moveaxis(states, -1, 0)
+    path[0] = np.moveaxis(np.broadcast_to(states, (*batch, start.shape[-1])), -1, 0)
     for number in range(1, len(path)):
         control = controls[..., (number - 1) // substeps, :]
         states = step(system, states, control, dt / substeps)

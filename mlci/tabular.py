@@ -12,7 +12,7 @@ Two probabilistic models share these arrays, told apart by the number of start p
   start point, with a constant factor that cancels. It is not the causal-entropy policy of a
   stochastic MDP, under which the demonstrator could not count on reaching any goal cell.
 
-Hence the second axis of the arrays is a *move*: an action from one start point, in the order
+Hence a cell has M *moves*: an action from one start point, in the order
 move = action * k^n + start point. In the centre model a move is an action.
 """
 
@@ -30,12 +30,14 @@ from mlci.grids import Grid
 from mlci.merged_moves import MergedMoves, merge_moves
 from mlci.regions import Regions, as_mask
 from mlci.simulate import rollout
+from mlci.single_moves import SingleMoves
 from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.systems import System
 
 _CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the curve it stands for
 _MOVES_AT_ONCE = 1 << 17  # what a step of long work holds beside its result: about 100 MB
 _PATHS_AT_ONCE = 1 << 13  # which the second level of cache nearly holds
+MOST_KEPT = 1 << 24  # moves: half a gigabyte
 
 # Called with how many parts of long work are done, and of how many.
 Progress = Callable[[int, int], None]
@@ -53,16 +55,15 @@ class TabularModel:
         actions: (A, m) controls, held for dt.
         dt: time step [s].
         regions: the C regions whose crossings are known: hypotheses, truths, or both.
-        successor: (S, M) cell after a move; -1 where it leaves the grid.
-        reward: (S, M) reward of a move, r dt / temperature [nat].
-        allowed: (S, M) whether a move may be taken.
-        crosses: (S * M, C) sparse boolean: row s * M + move, the regions its path enters.
+        samples: k; the moves of an action start at k^n points of a cell.
         temperature: what the rewards are divided by, (2).
         truth: (C,) mask of the regions that no move may cross, see `under`; none by default.
+        kept: the moves of all cells, whether or not the truth forbids them. None follows the
+            dynamics anew where moves are asked for, in less memory; a model whose cells and moves
+            stand for no dynamics has to keep them.
 
     Raises:
-        ValueError: arrays whose shapes disagree, an allowed move without a successor, or a dt that
-            is not positive.
+        ValueError: moves of another shape or to no cell, or a dt that is not positive.
     """
 
     system: System
@@ -70,44 +71,36 @@ class TabularModel:
     actions: Floats
     dt: float
     regions: Regions
-    successor: Ints
-    reward: Floats
-    allowed: Bools
-    crosses: sparse.csr_matrix
+    samples: int = 1
     temperature: float = 1.0
     truth: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    kept: SingleMoves | None = None
 
     def __post_init__(self) -> None:
-        shape = self.successor.shape
         if not len(self.truth):
             object.__setattr__(self, "truth", np.zeros(len(self.regions), dtype=bool))
-        if not (
-            len(shape) == 2
-            and shape[0] == self.grid.size
-            and shape[1] > 0
-            and shape[1] % len(self.actions) == 0
-            and self.reward.shape == self.allowed.shape == shape
-            and self.crosses.shape == (shape[0] * shape[1], len(self.regions))
-        ):
-            raise ValueError(
-                f"{self.grid.size} cells, {len(self.actions)} actions, {len(self.regions)} "
-                f"regions, successor {shape}, reward {self.reward.shape}, allowed "
-                f"{self.allowed.shape} and crosses {self.crosses.shape} do not agree"
-            )
-        if np.any(self.allowed & ((self.successor < 0) | (self.successor >= shape[0]))):
-            raise ValueError("a move that leads to no cell is marked as allowed")
         if not self.dt > 0:
             raise ValueError(f"a time step must be positive, not {self.dt} s")
+        if self.kept is None:
+            return
+        shape, crosses = self.kept.successor.shape, self.kept.crosses.shape
+        if shape != (self.states, self.moves) or crosses[1] != len(self.regions):
+            raise ValueError(
+                f"{self.states} cells of {self.moves} moves, {len(self.regions)} regions, "
+                f"successor {shape} and crosses {crosses} do not agree"
+            )
+        if np.any(self.kept.successor >= self.states):
+            raise ValueError("a move leads to no cell; one that leaves the grid has successor -1")
 
     @property
     def states(self) -> int:
         """S, the number of cells."""
-        return int(self.successor.shape[0])
+        return self.grid.size
 
     @property
     def moves(self) -> int:
         """M, the number of moves of a cell."""
-        return int(self.successor.shape[1])
+        return int(len(self.actions) * self.samples ** len(self.grid.shape))
 
     @cached_property
     def action(self) -> Ints:
@@ -122,28 +115,51 @@ class TabularModel:
     def move_origins(self, cells: Ints, moves: Ints) -> Floats:
         """(L, n) the states in which some moves of some cells begin."""
         points = self.moves // len(self.actions)  # k^n start points of a cell
-        samples = round(points ** (1 / len(self.grid.shape)))
-        return self.grid.points_inside(samples, cells)[np.arange(len(cells)), moves % points]
+        return self.grid.points_inside(self.samples, cells)[np.arange(len(cells)), moves % points]
 
     def move_reward(self, states: Floats, controls: Floats) -> Floats:
         """(L,) reward r dt / temperature [nat] of controls (L, m) held from states (L, n)."""
         return self.system.running_reward(states, controls) * (self.dt / self.temperature)
 
+    def moves_of(self, cells: Ints) -> SingleMoves:
+        """All moves of some cells (Q,), whether or not the truth forbids them."""
+        if self.kept is not None:
+            return self.kept.of(cells)
+        size = max(1, _PATHS_AT_ONCE // self.moves)
+        parts = [self._follow(cells[first : first + size]) for first in range(0, len(cells), size)]
+        return SingleMoves.joined(parts) if len(parts) != 1 else parts[0]
+
+    def _follow(self, cells: Ints) -> SingleMoves:
+        """The moves of some cells (Q,) by the dynamics."""
+        inside = self.grid.points_inside(self.samples, cells).reshape(-1, len(self.grid.shape))
+        controls = self.actions[:, None, :]
+        path = rollout(self.system, inside, controls[:, :, None, :], self.dt, self.substeps)
+        end, crosses = follow(self.grid, self.regions, path.reshape(-1, *path.shape[-2:]))
+        # Numpy is fast where an action is applied to many states; a cell's moves belong together.
+        order = np.arange(len(end)).reshape(len(controls), len(cells), -1).swapaxes(0, 1).ravel()
+        reward = np.broadcast_to(self.move_reward(inside, controls), path.shape[:2]).ravel()
+        shape = len(cells), self.moves
+        return SingleMoves(end[order].reshape(shape), reward[order].reshape(shape), crosses[order])
+
     @cached_property
     def merged(self) -> MergedMoves:
         """The moves of each cell, those with the same successor and crossings merged."""
-        return merge_moves(self.successor, self.reward, self.allowed, self.crosses, self.blocks())
+        return merge_moves(self.moves_of(cells) for cells in self.blocks()).under(self.truth)
 
-    def blocks(self) -> Iterator[slice]:
-        """Consecutive slices of the cells, of so many moves as one step of work should hold."""
+    def blocks(self) -> Iterator[Ints]:
+        """All cells in order, in blocks of so many moves as one step of work should hold."""
         size = max(1, _MOVES_AT_ONCE // self.moves)
         for first in range(0, self.states, size):
-            yield slice(first, min(first + size, self.states))
+            yield np.arange(first, min(first + size, self.states))
 
     def crossed(self, cells: Ints, moves: Ints) -> Bools:
-        """(C,) which regions a trajectory of cells (T+1,) and moves (T,) crosses."""
-        rows = self.crosses[cells[:-1] * self.moves + moves]
-        return np.asarray(rows.sum(axis=0)).ravel() > 0
+        """(..., C) which regions trajectories of moves (..., T) from cells (..., T) cross."""
+        here, place = np.unique(cells, return_inverse=True)
+        rows = self.moves_of(here).crosses[place.ravel() * self.moves + moves.ravel()]
+        crossed = np.zeros((*moves.shape, len(self.regions)), dtype=bool)
+        hit = rows.tocoo()
+        crossed.reshape(-1, len(self.regions))[hit.row, hit.col] = True
+        return np.asarray(crossed.any(axis=-2))
 
     def with_temperature(self, temperature: float) -> TabularModel:
         """The model at another temperature: moves are the same, rewards scale.
@@ -153,8 +169,10 @@ class TabularModel:
         """
         if not temperature > 0:
             raise ValueError(f"a temperature must be positive, not {temperature}")
-        reward = self.reward * (self.temperature / temperature)
-        return replace(self, reward=reward, temperature=temperature)
+        kept = self.kept
+        if kept is not None:
+            kept = replace(kept, reward=kept.reward * (self.temperature / temperature))
+        return replace(self, kept=kept, temperature=temperature)
 
     def under(self, truth: ArrayLike) -> TabularModel:
         """The model under constraints, equation (3): moves that cross the truth are not allowed.
@@ -163,11 +181,9 @@ class TabularModel:
             truth: (C,) mask over the regions, such as `model.regions.mask(["c1"])`.
         """
         mask = as_mask(truth, len(self.regions))
-        columns = np.flatnonzero(mask)
-        crossed = np.asarray(self.crosses[:, columns].sum(axis=1)).reshape(self.allowed.shape) > 0
-        constrained = replace(self, allowed=self.allowed & ~crossed, truth=self.truth | mask)
+        constrained = replace(self, truth=self.truth | mask)
         if "merged" in vars(self):  # what takes the time has been done
-            vars(constrained)["merged"] = self.merged.without(crossed)
+            vars(constrained)["merged"] = self.merged.under(mask)
         return constrained
 
 
@@ -229,39 +245,20 @@ def discretize(
         temperature: divides the reward (2).
         progress: called with how many cells are done, and of how many.
     """
-    actions = np.asarray(actions, dtype=float)
-    substeps = substep_count(system, grid, actions, dt)
-    points = samples ** len(grid.shape)
-    shape = grid.size, len(actions) * points
-    control_of = np.repeat(actions, points, axis=0)  # (M, m) the control of each move
-    successor, reward = np.empty(shape, dtype=np.int64), np.empty(shape)
-    crosses = []
-    size = max(1, _PATHS_AT_ONCE // shape[1])
-    for first in range(0, grid.size, size):
-        block = slice(first, min(first + size, grid.size))
-        inside = grid.points_inside(samples, block)
-        origin = np.tile(inside, (1, len(actions), 1)).reshape(-1, inside.shape[-1])
-        control = np.tile(control_of, (len(inside), 1))
-        path = rollout(system, origin, control[:, None, :], dt, substeps)
-        end, crossed = follow(grid, regions, path)
-        crosses.append(crossed)
-        successor[block] = end.reshape(-1, shape[1])
-        rewards = system.running_reward(origin, control) * (dt / temperature)
-        reward[block] = rewards.reshape(-1, shape[1])
-        if progress is not None:
-            progress(block.stop, grid.size)
-    return TabularModel(
-        system=system,
-        grid=grid,
-        actions=actions,
-        dt=dt,
-        regions=regions,
-        successor=successor,
-        reward=reward,
-        allowed=successor >= 0,
-        crosses=sparse.vstack(crosses, format="csr"),
-        temperature=temperature,
+    model = TabularModel(
+        system, grid, np.asarray(actions, dtype=float), dt, regions, samples, temperature
     )
+
+    def blocks() -> Iterator[SingleMoves]:
+        for cells in model.blocks():
+            yield model.moves_of(cells)
+            if progress is not None:
+                progress(int(cells[-1]) + 1, grid.size)
+
+    if model.states * model.moves <= MOST_KEPT:
+        return replace(model, kept=SingleMoves.joined(list(blocks())))
+    vars(model)["merged"] = merge_moves(blocks())
+    return model
 
 
 def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int:

@@ -125,7 +125,7 @@ def _model_set(
         if not under_truth.is_possible:
             break
         cells, moves = under_truth.sample(1, rng)
-        violated.append(point.model.crossed(cells[0], moves[0])[point.hypotheses])
+        violated.append(point.model.crossed(cells[0, :-1], moves[0])[point.hypotheses])
         avoidance.append(distribution.avoidance_probabilities()[point.hypotheses])
     shape = len(avoidance), len(point.inference.hypotheses)
     return Inference(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from types import ModuleType
 from typing import Any
 
@@ -23,11 +24,12 @@ from mlci.constant_controls import tabulate_escapes
 from mlci.grids import Grid
 from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
+from mlci.single_moves import SingleMoves
 from mlci.systems import System
-from mlci.tabular import TabularModel, discretize
+from mlci.tabular import MOST_KEPT, TabularModel, discretize
 
-# What is stored of a tabular model: its own arrays, and those of the sparse matrix of crossings.
-_MOVES = ("successor", "reward", "allowed")
+# What is stored of the moves of a tabular model, and of the sparse matrix of their crossings.
+_MOVES = ("successor", "reward")
 _CROSSINGS = ("indices", "indptr")
 
 ESCAPES = "escapes"  # the safe set from constant controls; else it solves the equation (9)
@@ -66,6 +68,17 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
 def tabular_model(settings: Settings, store: Store) -> TabularModel:
     """The tabular model (1); its regions are the hypotheses and then the truth's boxes."""
     hypotheses, truth = settings.candidates, settings.constraint
+    model = TabularModel(
+        system=settings.model,
+        grid=settings.cells,
+        actions=settings.action_values,
+        dt=settings.dt,
+        regions=hypotheses.joined(truth),
+        samples=settings.transition.samples,
+        temperature=settings.temperature,
+    )
+    if model.states * model.moves > MOST_KEPT:
+        return _discretize(settings, model.regions)
     stored = _discretized(settings, store, "mdp", hypotheses, (*_MOVES, *_CROSSINGS))
     # Apart, so that points which differ in the truth share what takes the time.
     apart = _discretized(settings, store, "mdp_truth", truth, _CROSSINGS)
@@ -76,16 +89,8 @@ def tabular_model(settings: Settings, store: Store) -> TabularModel:
         )
         for each, regions in ((stored, hypotheses), (apart, truth))
     ]
-    return TabularModel(
-        system=settings.model,
-        grid=settings.cells,
-        actions=settings.action_values,
-        dt=settings.dt,
-        regions=hypotheses.joined(truth),
-        crosses=sparse.hstack(crosses, format="csr"),
-        temperature=settings.temperature,
-        **{name: stored[name] for name in _MOVES},
-    )
+    joined = sparse.hstack(crosses, format="csr")
+    return replace(model, kept=SingleMoves(stored["successor"], stored["reward"], joined))
 
 
 def model_inputs(settings: ModelSettings, regions: Regions) -> tuple[Any, ...]:
@@ -108,21 +113,27 @@ def _discretized(
     """Arrays of the tabular model with the crossings of some regions, stored or computed."""
 
     def compute() -> dict[str, np.ndarray]:
-        model = discretize(
-            settings.model,
-            settings.cells,
-            settings.action_values,
-            settings.dt,
-            regions,
-            settings.transition.samples,
-            settings.temperature,
-        )
-        arrays = {name: getattr(model, name) for name in _MOVES}
-        arrays |= {name: getattr(model.crosses, name) for name in _CROSSINGS}
+        kept = _discretize(settings, regions).kept
+        assert kept is not None  # it is not too large
+        arrays = {name: getattr(kept, name) for name in _MOVES}
+        arrays |= {name: getattr(kept.crosses, name) for name in _CROSSINGS}
         return {name: arrays[name] for name in names}
 
     modules = [mlci.tabular, system_module(settings.model), sys.modules[__name__]]
     return store.get(stage, model_inputs(settings, regions), modules, compute)
+
+
+def _discretize(settings: Settings, regions: Regions) -> TabularModel:
+    """The tabular model with the crossings of some regions."""
+    return discretize(
+        settings.model,
+        settings.cells,
+        settings.action_values,
+        settings.dt,
+        regions,
+        settings.transition.samples,
+        settings.temperature,
+    )
 
 
 def corners(regions: Regions) -> list[list[str]]:

@@ -51,19 +51,18 @@ def trajectory_tables(
     visits, crossed = [], []
     for trial, (cells, moves) in trajectories.items():
         visits += [(trial, step, cell) for step, cell in enumerate(cells)]
-        regions = model.crossed(cells, moves)[hypotheses]
+        regions = model.crossed(cells[:-1], moves)[hypotheses]
         crossed += [(trial, "sampled", i) for i in np.flatnonzero(regions)]
     for trial, regions in violated.items():
         crossed += [(trial, "demonstration", i) for i in np.flatnonzero(regions)]
-    steps = {
-        (int(cell), int(model.action[move]), int(model.successor[cell, move]))
-        for cell in (() if example is None else trajectories[example][0])
-        for move in np.flatnonzero(model.allowed[cell])
-    }
+    visited = np.unique(() if example is None else trajectories[example][0]).astype(np.int64)
+    single = model.moves_of(visited)
+    row, move = np.nonzero(single.allowed(model.truth))
+    rows = np.stack([visited[row], model.action[move], single.successor[row, move]], axis=1)
     return {
         "sampled": pd.DataFrame(visits, columns=["trial", "step", "cell"]),
         "violations": pd.DataFrame(sorted(crossed), columns=["trial", "source", "hypothesis"]),
-        "moves": pd.DataFrame(sorted(steps), columns=["cell", "action", "successor"]),
+        "moves": pd.DataFrame(np.unique(rows, axis=0), columns=["cell", "action", "successor"]),
     }
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from tqdm import tqdm
 
 from experiments.tracking.environment import peak_memory
+from mlci.diagnosis import diagnose
 from mlci.evidence import rank_constraints
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
@@ -103,7 +104,7 @@ def measure(name: str, shape: tuple[int, ...]) -> dict[str, object]:
         "hypotheses": len(hypotheses),
         "steps": steps,
         "dt": DT,
-        "moves_allowed": round(float(np.mean(model.allowed)), 4),
+        "moves_allowed": round(1 - diagnose(model).leave, 4),
         "largest_active_share": round(float(np.max(active)) / grid.size, 4),
         "cells_active": int(np.sum(active)),
         "discretise_s": round(float(seconds[0]), 4),

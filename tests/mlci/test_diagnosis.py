@@ -38,7 +38,7 @@ def test_diagnosis_counts_what_moves_do(monkeypatch: pytest.MonkeyPatch, at_once
     stay, leave, changing = 0, 0, [set(), set()]
     for cell in range(grid.size):
         for move in range(3):
-            end = int(mdp.successor[cell, move])
+            end = int(mdp.kept.successor[cell, move])
             stay += end == cell
             leave += end < 0
             for d in range(2):

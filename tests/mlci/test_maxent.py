@@ -40,16 +40,16 @@ def enumerate_trajectories(
     mdp: TabularModel, start: int, goals: list[int], steps: int
 ) -> tuple[float, Floats]:
     """Z and, for each region, the part of Z that crosses it, by listing every move sequence."""
-    crosses = mdp.crosses.toarray().reshape(mdp.states, mdp.moves, -1)
+    crosses = mdp.kept.crosses.toarray().reshape(mdp.states, mdp.moves, -1)
     total, crossing = 0.0, np.zeros(crosses.shape[2])
     for sequence in itertools.product(range(mdp.moves), repeat=steps):
         state, reward, crossed = start, 0.0, np.zeros(crosses.shape[2], dtype=bool)
         for move in sequence:
-            if not mdp.allowed[state, move]:
+            if not mdp.kept.allowed(mdp.truth)[state, move]:
                 break
-            reward += mdp.reward[state, move]
+            reward += mdp.kept.reward[state, move]
             crossed |= crosses[state, move]
-            state = mdp.successor[state, move]
+            state = mdp.kept.successor[state, move]
         else:
             if state in goals:
                 total += np.exp(reward)
@@ -60,7 +60,7 @@ def enumerate_trajectories(
 def forward_violation_probabilities(distribution: TrajectoryDistribution) -> Floats:
     """Phi by pushing the mass that has not yet violated forward from the start."""
     mdp = distribution.model
-    crosses = mdp.crosses.toarray().reshape(mdp.states, mdp.moves, -1)
+    crosses = mdp.kept.crosses.toarray().reshape(mdp.states, mdp.moves, -1)
     clean = np.zeros((mdp.states, crosses.shape[2]))
     clean[distribution.start] = 1.0
     violated = np.zeros(crosses.shape[2])
@@ -71,7 +71,7 @@ def forward_violation_probabilities(distribution: TrajectoryDistribution) -> Flo
                 moving = chance * clean[state]
                 violated += moving * crosses[state, move]
                 if chance > 0:
-                    after[mdp.successor[state, move]] += moving * ~crosses[state, move]
+                    after[mdp.kept.successor[state, move]] += moving * ~crosses[state, move]
         clean = after
     return violated
 
@@ -120,9 +120,10 @@ def test_log_avoidance_is_the_difference_of_log_partitions(depth: float) -> None
     deepest = 0.0
     for seed in range(8):
         mdp = toy_world(seed)
-        crossing = mdp.crosses.toarray()[:, 0].reshape(6, 4)
+        crossing = mdp.kept.crosses.toarray()[:, 0].reshape(6, 4)
         # Moves that cross region 0 are well paid for, so that hardly anything avoids it.
-        mdp = replace(mdp, reward=mdp.reward + depth * crossing)
+        paid = replace(mdp.kept, reward=mdp.kept.reward + depth * crossing)
+        mdp = replace(mdp, kept=paid)
         free = TrajectoryDistribution(mdp, 0, [1, 3], 5)
         if not free.is_possible:
             continue
@@ -170,9 +171,11 @@ def test_policy_is_a_distribution_over_allowed_moves_that_stay_on_course() -> No
     for t in range(5):
         cells, chances = distribution.policy(t)
         np.testing.assert_allclose(chances.sum(axis=1), 1.0, atol=1e-15)
-        assert np.all(chances[~mdp.allowed[cells]] == 0)
+        assert np.all(chances[~mdp.kept.allowed(mdp.truth)[cells]] == 0)
         taken = np.argwhere(chances > 0)
-        assert np.all(np.isfinite(log_z[t + 1, mdp.successor[cells[taken[:, 0]], taken[:, 1]]]))
+        assert np.all(
+            np.isfinite(log_z[t + 1, mdp.kept.successor[cells[taken[:, 0]], taken[:, 1]]])
+        )
 
 
 def test_only_cells_between_start_and_goal_carry_probability() -> None:
@@ -249,9 +252,9 @@ def test_sampled_trajectories_follow_the_distribution() -> None:
     count = 20_000
     cells, moves = distribution.sample(count, np.random.default_rng(1))
     assert np.all(np.isin(cells[:, -1], [1, 3]))
-    np.testing.assert_array_equal(cells[:, 1:], mdp.successor[cells[:, :-1], moves])
+    np.testing.assert_array_equal(cells[:, 1:], mdp.kept.successor[cells[:, :-1], moves])
     rows = (cells[:, :-1] * mdp.moves + moves).ravel()
-    crossed = mdp.crosses.toarray()[rows].reshape(count, 5, -1).any(axis=1)
+    crossed = mdp.kept.crosses.toarray()[rows].reshape(count, 5, -1).any(axis=1)
     phi = distribution.violation_probabilities()
     error = np.sqrt(phi * (1 - phi) / count)
     assert np.all(np.abs(crossed.mean(axis=0) - phi) <= 4 * error + 1e-12)

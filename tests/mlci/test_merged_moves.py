@@ -34,18 +34,18 @@ def test_merged_moves_have_one_successor_and_the_same_regions(
     grid = Grid(system.space, (6, 5))
     regions = Regions.from_grid(system.space, (4, 3))
     mdp = discretize(system, grid, action_grid(system, 5), 0.8, regions, samples)
-    crosses = mdp.crosses.toarray().reshape(grid.size, mdp.moves, len(regions))
+    crosses = mdp.kept.crosses.toarray().reshape(grid.size, mdp.moves, len(regions))
     monkeypatch.setattr("mlci.tabular._MOVES_AT_ONCE", at_once)
-    assert not mdp.allowed.all()
+    assert not mdp.kept.allowed(mdp.truth).all()
     merged = 0
     for cell in range(grid.size):
         rewards: dict[tuple[int, frozenset[int]], list[float]] = {}
-        for move in np.flatnonzero(mdp.allowed[cell]):
+        for move in np.flatnonzero(mdp.kept.allowed(mdp.truth)[cell]):
             key = (
-                int(mdp.successor[cell, move]),
+                int(mdp.kept.successor[cell, move]),
                 frozenset(np.flatnonzero(crosses[cell, move]).tolist()),
             )
-            rewards.setdefault(key, []).append(mdp.reward[cell, move])
+            rewards.setdefault(key, []).append(mdp.kept.reward[cell, move])
             merged += len(rewards[key]) > 1
         found = of_cell(mdp, cell)
         assert found.keys() == rewards.keys()
@@ -59,7 +59,7 @@ def test_a_cell_that_every_move_leaves_the_space_from_has_no_merged_move() -> No
     grid = Grid(system.space, (3, 3))
     regions = Regions.from_grid(system.space, (3, None))
     mdp = discretize(system, grid, action_grid(system, 3), 2.0, regions)
-    stuck = ~mdp.allowed.any(axis=1)
+    stuck = ~mdp.kept.allowed(mdp.truth).any(axis=1)
     assert 0 < stuck.sum() < grid.size
     np.testing.assert_array_equal(np.diff(mdp.merged.begins) == 0, stuck)
     start = int(np.flatnonzero(stuck)[0])
@@ -78,9 +78,14 @@ def test_forbidden_merged_moves_are_those_of_the_forbidden_moves() -> None:
     assert len(mdp.merged.successor) > 0
     derived = mdp.under(truth)
     assert derived.merged.successor is mdp.merged.successor
+    crosses = mdp.kept.crosses.toarray().reshape(grid.size, mdp.moves, len(regions))
     for cell in range(grid.size):
         free = {key: w for key, w in of_cell(derived, cell).items() if w > -np.inf}
-        assert free == of_cell(fresh, cell)
+        assert of_cell(derived, cell) == of_cell(fresh, cell)
+        assert free.keys() == {
+            (int(mdp.kept.successor[cell, move]), frozenset(np.flatnonzero(crosses[cell, move])))
+            for move in np.flatnonzero(fresh.kept.allowed(truth)[cell])
+        }
     one, other = (TrajectoryDistribution(model, 3, 60, 6) for model in (derived, fresh))
     np.testing.assert_allclose(one.log_z, other.log_z, rtol=1e-12)
     assert one.is_possible

@@ -30,14 +30,14 @@ def toy_world() -> TabularModel:
 
 def every_trajectory(model: TabularModel, goal: int) -> tuple[Bools, Floats]:
     """Which regions each trajectory from cell 0 crosses, and its probability, by listing them."""
-    crosses = model.crosses.toarray().reshape(model.states, model.moves, -1)
+    crosses = model.kept.crosses.toarray().reshape(model.states, model.moves, -1)
     crossed, weight = [], []
     for sequence in itertools.product(range(model.moves), repeat=STEPS):
         state, reward, row = 0, 0.0, np.zeros(4, dtype=bool)
         for move in sequence:
-            reward += model.reward[state, move]
+            reward += model.kept.reward[state, move]
             row |= crosses[state, move]
-            state = model.successor[state, move]
+            state = model.kept.successor[state, move]
         if state == goal:
             crossed.append(row)
             weight.append(np.exp(reward))

@@ -178,13 +178,13 @@ def test_of_a_tabular_model_it_is_the_same_as_over_all_its_paths() -> None:
     for moves in itertools.product(range(5), repeat=3):
         cells, reward = [distribution.start], 0.0
         for move in moves:
-            if not MODEL.allowed[cells[-1], move]:
+            if not MODEL.kept.allowed(MODEL.truth)[cells[-1], move]:
                 break
-            reward += MODEL.reward[cells[-1], move]
-            cells.append(int(MODEL.successor[cells[-1], move]))
+            reward += MODEL.kept.reward[cells[-1], move]
+            cells.append(int(MODEL.kept.successor[cells[-1], move]))
         if len(cells) == 4 and cells[-1] in distribution.goal:
             rewards.append(reward)
-            crosses.append(MODEL.crossed(np.array(cells), np.array(moves)))
+            crosses.append(MODEL.crossed(np.array(cells[:-1]), np.array(moves)))
     every = AllPaths(np.array(rewards), np.array(crosses)[:, :3])
     assert len(rewards) > 2
     worst = int(np.argsort(rewards)[1])

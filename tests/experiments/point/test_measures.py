@@ -134,8 +134,8 @@ def test_one_sampled_trajectory_is_kept_of_each_that_is_feasible(
         demonstration = point.demonstrations[[4, 7].index(number)]
         assert cells[0] == point.model.grid.index(demonstration.task.start)
         assert cells[-1] == point.model.grid.index(demonstration.task.goal.lower)
-        np.testing.assert_array_equal(point.model.successor[cells[:-1], moves], cells[1:])
-        crossed = point.model.crosses[cells[:-1] * point.model.moves + moves].toarray()
+        np.testing.assert_array_equal(point.model.kept.successor[cells[:-1], moves], cells[1:])
+        crossed = point.model.kept.crosses[cells[:-1] * point.model.moves + moves].toarray()
         assert not crossed[:, point.truth].any()
     others = measure_point(dataclasses.replace(settings, rollouts=200, seed=4), point)
     assert any(
