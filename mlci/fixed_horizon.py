@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mlci.merged_moves import MergedMoves
-from mlci.recursions import Leg, avoidance, log_z_to_go, reachable_cells
+from mlci.recursions import Leg, backward_pass, reachable_cells
 from mlci.spaces import Floats, Ints
 from mlci.tables import Table
 
@@ -40,10 +40,7 @@ class FixedHorizon:
     @cached_property
     def log_z(self) -> Floats:
         """(T+1, S) log Z to go [nat]; log_z[0] is log Z of each start, -inf where there is none."""
-        table = self.table
-        goals = table.goals if len(table.goals) else np.arange(table.states)
-        starts = np.flatnonzero(table.start)
-        return log_z_to_go([self._leg], reachable_cells(self._leg[0], starts, self.steps), goals)
+        return self._backward_pass(0, 0)[0]
 
     def policy(self, t: int) -> Floats:
         """(S, A) probability of each action at a step; rows are 0 where no trajectory goes on."""
@@ -79,7 +76,14 @@ class FixedHorizon:
             ValueError: no trajectory from there ends in a goal.
         """
         self._require_possible(np.array([start]))
-        return avoidance([self._leg], self.log_z, start, len(self.table.regions))
+        return self._backward_pass(start, len(self.table.regions))[1]
+
+    def _backward_pass(self, start: int, regions: int) -> tuple[Floats, Floats]:
+        """log_z (T+1, S) of all starts, and alpha (C,) of one."""
+        table = self.table
+        goals = table.goals if len(table.goals) else np.arange(table.states)
+        reachable = reachable_cells(self._leg[0], np.flatnonzero(table.start), self.steps)
+        return backward_pass([self._leg], reachable, goals, start, regions)
 
     @cached_property
     def _leg(self) -> Leg:

@@ -16,7 +16,7 @@ import numpy as np
 from mlci.demonstrations import Task
 from mlci.end_moves import first_moves, last_moves, only_moves
 from mlci.merged_moves import MergedMoves
-from mlci.recursions import Leg, avoidance, log_z_to_go, move_probabilities, reachable_cells
+from mlci.recursions import Leg, backward_pass, move_probabilities, reachable_cells
 from mlci.simulate import step_count
 from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.tabular import TabularModel
@@ -107,15 +107,15 @@ class TrajectoryDistribution:
         if self.ends is not None:  # what takes the time has been done
             scale = self.model.temperature / model.temperature
             vars(other)["start_moves"] = self.start_moves.scaled(scale)
-            vars(other)["reachable"] = self.reachable
             if self.steps > 1:
+                vars(other)["_between"] = self._between
                 vars(other)["goal_moves"] = self.goal_moves.scaled(scale)
         return other
 
     @cached_property
     def log_z(self) -> Floats:
         """(T+1, S) log Z to go [nat], by the soft Bellman backup; log_z[0, start] is log Z."""
-        return log_z_to_go(self._legs, self.reachable, self.goal)
+        return backward_pass(self._legs, self.reachable, self.goal, self.start, 0)[0]
 
     @cached_property
     def reachable(self) -> Bools:
@@ -125,10 +125,17 @@ class TrajectoryDistribution:
         reached = np.zeros((self.steps + 1, self.model.states), dtype=bool)
         reached[0, self.start] = True
         if self.steps > 1:
-            starts = self.start_moves.successor[self.start_moves.log_weight > -np.inf]
-            reached[1:-1] = reachable_cells(self.model.merged, starts, self.steps - 2)
-        reached[-1, self.goal] = True  # the last moves go nowhere else
+            reached[1:-1] = self._between
+            reached[-1, self.goal_moves.allowed_successors] = True
+        else:
+            reached[-1, self.start_moves.allowed_successors] = True
         return reached
+
+    @cached_property
+    def _between(self) -> Bools:
+        """(T-1, S) cells that can be occupied after 1 .. T-1 moves from the exact start."""
+        starts = self.start_moves.allowed_successors
+        return reachable_cells(self.model.merged, starts, self.steps - 2)
 
     @cached_property
     def start_moves(self) -> MergedMoves:
@@ -142,7 +149,7 @@ class TrajectoryDistribution:
     def goal_moves(self) -> MergedMoves:
         """The moves that end at the exact goal."""
         assert self.ends is not None
-        cells = np.flatnonzero(self.reachable[-2])
+        cells = np.flatnonzero(self._between[-1])
         return last_moves(self.model, cells, self.goal, self.ends.goal)
 
     @property
@@ -159,7 +166,7 @@ class TrajectoryDistribution:
     @property
     def is_possible(self) -> bool:
         """Whether any trajectory from the start reaches a goal: else there is no distribution."""
-        return bool(self.log_z[0, self.start] > -np.inf)
+        return bool(np.any(self.reachable[-1, self.goal]))
 
     def policy(self, t: int) -> tuple[Ints, Floats]:
         """pi_t(move | s) = exp(reward + log_z[t+1, s'] - log_z[t, s]), the soft optimal policy.
@@ -183,7 +190,10 @@ class TrajectoryDistribution:
             ValueError: no trajectory reaches a goal.
         """
         self._require_possible("probabilities are not defined")
-        return avoidance(self._legs, self.log_z, self.start, len(self.model.regions))
+        regions = len(self.model.regions)
+        log_z, alpha = backward_pass(self._legs, self.reachable, self.goal, self.start, regions)
+        vars(self)["log_z"] = log_z  # it comes along
+        return alpha
 
     def violation_probabilities(self) -> Floats:
         """Phi_(i,T) = 1 - alpha_i (C,): the probability that a trajectory crosses region i."""

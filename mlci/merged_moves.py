@@ -42,6 +42,11 @@ class MergedMoves:
         """S, the number of cells."""
         return len(self.begins) - 1
 
+    @property
+    def allowed_successors(self) -> Ints:
+        """Cells that those lead to which are not forbidden."""
+        return self.successor[self.log_weight > -np.inf]
+
     def scaled(self, factor: float) -> MergedMoves:
         """The same with rewards times a factor, as at another temperature; no two are merged."""
         return replace(self, log_weight=self.log_weight * factor)

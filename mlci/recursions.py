@@ -32,30 +32,32 @@ def reachable_cells(moves: MergedMoves, starts: Ints | Sequence[int], steps: int
     return reached
 
 
-def log_z_to_go(legs: Sequence[Leg], reachable: Bools, goal: Ints) -> Floats:
-    """log_z (T+1, S) [nat] into the goal cells (G,), of cells that are reachable (T+1, S)."""
+def backward_pass(
+    legs: Sequence[Leg], reachable: Bools, goal: Ints, start: int, regions: int
+) -> tuple[Floats, Floats]:
+    """log_z (T+1, S) [nat] of reachable cells (T+1, S), and alpha_0 (C,) of the start.
+
+    Args:
+        legs: the moves of each part of the way, in order.
+        reachable: see `reachable_cells`; a goal among the last ones.
+        goal: (G,) the goal cells.
+        start: the start cell.
+        regions: C, the number of regions; 0 takes log_z alone.
+    """
+    states, last = reachable.shape[1], len(reachable) - 1
     log_z = np.full(reachable.shape, -np.inf)
-    log_z[-1, goal[reachable[-1, goal]]] = 0.0
-    for moves, early, late in reversed(legs):
-        arrays = moves.begins, moves.successor, moves.log_weight
-        _soft_bellman(*arrays, reachable, early, late, log_z)
-    return log_z
-
-
-def avoidance(legs: Sequence[Leg], log_z: Floats, start: int, regions: int) -> Floats:
-    """alpha_0 (C,) of the start cell."""
-    steps, states = len(log_z) - 1, log_z.shape[1]
+    log_z[last, goal[reachable[last, goal]]] = 0.0
     blocks = max(1, min(regions, -(-regions * 2 * 8 * states // ALPHA_BYTES)))
     alpha = np.empty(regions)
-    for first, last in pairwise(np.linspace(0, regions, blocks + 1).astype(int).tolist()):
-        of_two_steps = np.empty((2, states, last - first))
-        of_two_steps[steps % 2, log_z[steps] > -np.inf] = 1.0
+    for first, end in pairwise(np.linspace(0, regions, blocks + 1).astype(int).tolist()):
+        levels = np.empty((2, states, end - first))  # alpha_t is levels[t % 2]
+        levels[last % 2, goal] = 1.0
         for moves, early, late in reversed(legs):
             arrays = moves.begins, moves.successor, moves.log_weight
             crossings = moves.crossing_begins, moves.crossing_region
-            _avoid(*arrays, *crossings, log_z, early, late, first, of_two_steps)
-        alpha[first:last] = of_two_steps[0, start]
-    return np.minimum(alpha, 1.0)
+            _step_back(*arrays, *crossings, reachable, early, late, log_z, first, levels)
+        alpha[first:end] = levels[0, start]
+    return log_z, np.minimum(alpha, 1.0)
 
 
 @compiled("void(i8[::1], i4[::1], f8[::1], b1[:, ::1])")
@@ -69,83 +71,65 @@ def _spread(begins: Ints, successor: Ints, log_weight: Floats, reached: Bools) -
                         reached[t + 1, successor[k]] = True
 
 
-@compiled("void(i8[::1], i4[::1], f8[::1], b1[:, ::1], i8, i8, f8[:, ::1])")
-def _soft_bellman(
-    begins: Ints,
-    successor: Ints,
-    log_weight: Floats,
-    reachable: Bools,
-    early: int,
-    late: int,
-    log_z: Floats,
-) -> None:
-    """log_z[t, s] = log sum_k e^(log_weight[k] + log_z[t+1, s'_k]), for t from late - 1 to early.
-
-    The sum is over the merged moves k of cell s; log_z (T+1, S) is filled in where `reachable`.
-    """
-    for t in range(late - 1, early - 1, -1):
-        for s in range(log_z.shape[1]):
-            if not reachable[t, s]:
-                continue
-            best = -np.inf
-            for k in range(begins[s], begins[s + 1]):
-                best = max(best, log_weight[k] + log_z[t + 1, successor[k]])
-            if best == -np.inf:
-                continue
-            total = 0.0
-            for k in range(begins[s], begins[s + 1]):
-                value = log_weight[k] + log_z[t + 1, successor[k]]
-                if value > -np.inf:
-                    total += np.exp(value - best)
-            log_z[t, s] = best + np.log(total)
-
-
 @compiled(
-    "void(i8[::1], i4[::1], f8[::1], i8[::1], i4[::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])"
+    "void(i8[::1], i4[::1], f8[::1], i8[::1], i4[::1], b1[:, ::1], i8, i8, f8[:, ::1], i8, "
+    "f8[:, :, ::1])"
 )
-def _avoid(
+def _step_back(
     begins: Ints,
     successor: Ints,
     log_weight: Floats,
     crossing_begins: Ints,
     crossing_region: Ints,
-    log_z: Floats,
+    reachable: Bools,
     early: int,
     late: int,
+    log_z: Floats,
     first: int,
-    alpha: Floats,
+    levels: Floats,
 ) -> None:
-    """alpha_t(s, i) = sum_k pi_t(k | s) alpha_(t+1)(s'_k, i), for t from late - 1 to early.
+    """Both recursions, from step late - 1 back to step early, over the merged moves k of a cell.
 
-    The sum is over the merged moves k of cell s that do not cross region i: the entries of regions
-    that k crosses are put back to what they were. alpha (2, S, C') holds step t at t % 2, of the
-    regions from `first` on.
+    log_z[t, s] = log sum_k e^v[k], with v[k] = log_weight[k] + log_z[t+1, s'_k], fills log_z
+    (T+1, S) where `reachable`. alpha_t(s, i) = sum_k pi(k) alpha_(t+1)(s'_k, i) over those that do
+    not cross region i, with pi(k) = e^v[k] / sum_j e^v[j], fills levels[t % 2] (S, C') of the
+    regions from `first` on: what k would add to those that it crosses is taken back.
     """
-    regions = alpha.shape[2]
-    kept = np.empty(regions)
+    regions, most = levels.shape[2], 0
+    for s in range(log_z.shape[1]):
+        most = max(most, begins[s + 1] - begins[s])
+    value, kept = np.empty(most), np.empty(regions)
     for t in range(late - 1, early - 1, -1):
         for s in range(log_z.shape[1]):
-            if log_z[t, s] == -np.inf:
+            if not reachable[t, s]:
                 continue
-            here, total = alpha[t % 2, s], 0.0
+            best, total, begin = -np.inf, 0.0, begins[s]
+            for k in range(begin, begins[s + 1]):
+                value[k - begin] = log_weight[k] + log_z[t + 1, successor[k]]
+                best = max(best, value[k - begin])
+            if best == -np.inf:
+                continue
+            here = levels[t % 2, s]
             here[:] = 0.0
-            for k in range(begins[s], begins[s + 1]):
-                value = log_weight[k] + log_z[t + 1, successor[k]]
-                if value == -np.inf:
+            for k in range(begin, begins[s + 1]):
+                if value[k - begin] == -np.inf:
                     continue
-                probability = np.exp(value - log_z[t, s])
-                total += probability
-                there = alpha[(t + 1) % 2, successor[k]]
+                weight = np.exp(value[k - begin] - best)
+                total += weight
+                if regions == 0:
+                    continue
+                there = levels[(t + 1) % 2, successor[k]]
                 for entry in range(crossing_begins[k], crossing_begins[k + 1]):
                     region = crossing_region[entry] - first
                     if 0 <= region < regions:
                         kept[region] = here[region]
                 for i in range(regions):
-                    here[i] += probability * there[i]
+                    here[i] += weight * there[i]
                 for entry in range(crossing_begins[k], crossing_begins[k + 1]):
                     region = crossing_region[entry] - first
                     if 0 <= region < regions:
                         here[region] = kept[region]
+            log_z[t, s] = best + np.log(total)
             for i in range(regions):
                 here[i] /= total
 

@@ -181,8 +181,10 @@ def test_policy_is_a_distribution_over_allowed_moves_that_stay_on_course() -> No
 def test_only_cells_between_start_and_goal_carry_probability() -> None:
     """On a one-way corridor each step has one possible cell, and a late goal none."""
     cells = 6
+    successor = np.minimum(np.arange(cells) + 1, cells - 1)
+    successor[0] = 2  # a way to the goal that does not begin at the start
     corridor = toy_model(
-        np.minimum(np.arange(cells) + 1, cells - 1)[:, None],
+        successor[:, None],
         np.zeros((cells, 1)),
         np.ones((cells, 1), dtype=bool),
         np.zeros((cells, 1), dtype=bool),
