@@ -65,12 +65,15 @@ lint: $(READY) ## check style, formatting and types
 	$(BIN)/ruff format --check
 	$(BIN)/mypy mlci experiments
 
-benchmark: $(READY) ## time the main algorithms against floors of this machine
+benchmark: $(READY) ## time the project against other packages and floors
 	$(BIN)/python -m tests.benchmark
+
+# All extras but the benchmark's peers, which weigh gigabytes.
+LOCKED := parquet excel mocap slurm dask dev
 
 lock: $(READY) ## write requirements.lock from pyproject.toml, at the newest versions
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
-		--all-extras --custom-compile-command "make lock" --output-file requirements.lock pyproject.toml
+		$(LOCKED:%=--extra %) --custom-compile-command "make lock" --output-file requirements.lock pyproject.toml
 
 # Packages without a wheel are built with the locked setuptools, which therefore comes first. A stamp is
 # written last: an installation that failed halfway is tried again.

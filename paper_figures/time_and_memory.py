@@ -1,4 +1,4 @@
-"""Time and memory of one task against the number of tabular states, in four dimensions."""
+"""Time and memory against the number of tabular states, and time against all else that may grow."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
-from paper_figures.style import COLUMN, GUIDE, OTHER_COLOURS, RC, new_figure
+from paper_figures.style import COLUMN, GUIDE, OTHER_COLOURS, OTHER_MARKS, RC, new_figure
 
 TABLES = {
     "scale": (
         *("system", "states", "actions", "hypotheses", "steps", "dt", "largest_active_share"),
         *("discretise_s", "infer_s", "total_s", "peak_mb"),
         *("cpu", "python", "numpy", "scipy", "commit", "date"),
-    )
+    ),
+    "growth": ("factor", "value", "discretise_s", "infer_s"),
 }
 PAPER_STATES = 2500  # of the paper's telescoping pendulum
 
@@ -29,13 +30,14 @@ _TIMES = (
 _MEMORY = (("peak_mb", "peak", OTHER_COLOURS[0], "^"),)
 
 
-def draw(scale: pd.DataFrame) -> Figure:
-    """Draw time and memory, both axes logarithmic, with a line of slope 1 through the last point.
+def draw(scale: pd.DataFrame, growth: pd.DataFrame) -> Figure:
+    """Draw time and memory, all axes logarithmic, with a line of slope 1 through the last point.
 
     Args:
         scale: the table of that name: a row a system and size.
+        growth: the table of that name: a row a size, by what grows.
     """
-    figure, (left, right) = new_figure(COLUMN, 2.4, ncols=2)
+    figure, ((left, right), below) = new_figure(COLUMN, 4.6, nrows=2, ncols=2)
     with plt.rc_context(RC):
         _draw_panel(left, scale, _TIMES, "processor time [s]")
         _draw_panel(right, scale, _MEMORY, "memory [MB]")
@@ -48,11 +50,14 @@ def draw(scale: pd.DataFrame) -> Figure:
         if len(_systems(scale)) > 1:
             dashed = {"linestyle": "--", "marker": "o", "markerfacecolor": "white"}
             entries.append(Line2D([], [], color=OTHER_COLOURS[0], label="four angles", **dashed))
+        for axes, (column, name, _, _) in zip(below, _TIMES, strict=True):
+            _draw_growth(axes, growth, column, f"{name} [multiple]")
+        entries += below[0].get_legend_handles_labels()[0]
         figure.legend(handles=entries, loc="outside lower center", ncols=2)
     return figure
 
 
-def facts(scale: pd.DataFrame) -> str:
+def facts(scale: pd.DataFrame, growth: pd.DataFrame) -> str:
     """What the caption says."""
     first = scale.iloc[0]
     lines = [
@@ -80,6 +85,15 @@ def facts(scale: pd.DataFrame) -> str:
                 f"  {system}: from {few['states']} to {many['states']} states the time grows with "
                 f"the power {slope:.2f}"
             )
+    lines.append("Below, what else grows; times as multiples of that at the smallest size.")
+    for factor, rows in _factors(growth):
+        few, many = rows.iloc[0], rows.iloc[-1]
+        more = np.log(many["value"] / few["value"])
+        powers = [np.log(many[column] / few[column]) / more for column, *_ in _TIMES]
+        lines.append(
+            f"  {factor} from {few['value']} to {many['value']}: discretising grows with the power "
+            f"{powers[0]:.2f}, inference with {powers[1]:.2f}"
+        )
     lines.append(
         f"Measured on {first['cpu']}, Python {first['python']}, numpy {first['numpy']}, scipy "
         f"{first['scipy']}, commit {first['commit']}, {first['date']}."
@@ -93,6 +107,40 @@ def _systems(scale: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
         (system, scale[scale["system"] == system].sort_values("states"))
         for system in scale["system"].unique()
     ]
+
+
+def _factors(growth: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    """The rows of each factor by size, in the order of the table."""
+    return [
+        (factor, growth[growth["factor"] == factor].sort_values("value"))
+        for factor in growth["factor"].unique()
+    ]
+
+
+def _draw_growth(axes: Axes, growth: pd.DataFrame, column: str, label: str) -> None:
+    """Times of each factor against its size, both as multiples of the smallest."""
+    for number, (factor, rows) in enumerate(_factors(growth)):
+        axes.plot(
+            rows["value"] / rows["value"].iloc[0],
+            rows[column] / rows[column].iloc[0],
+            color=OTHER_COLOURS[number % len(OTHER_COLOURS)],
+            marker=OTHER_MARKS[number % len(OTHER_MARKS)],
+            linestyle="-" if number < len(OTHER_COLOURS) else "--",
+            label=factor,
+        )
+    most = float((growth["value"] / growth.groupby("factor")["value"].transform("min")).max())
+    axes.plot([1, most], [1, most], color=GUIDE, linestyle=":", linewidth=0.8)
+    _on_logarithms(axes, "size [multiple]", label)
+
+
+def _on_logarithms(axes: Axes, x_label: str, y_label: str) -> None:
+    """Logarithmic axes with labels, and with numbers at the powers of ten alone."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
 
 
 def _draw_panel(
@@ -118,9 +166,4 @@ def _draw_panel(
     y = float(longest[curves[0][0]].iloc[-1]) * x / x[-1]
     axes.plot(x, y, color=GUIDE, linestyle=":", linewidth=0.8)
     axes.axvline(PAPER_STATES, color=GUIDE, linewidth=0.6)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel("states")
-    axes.set_ylabel(label)
+    _on_logarithms(axes, "states", label)

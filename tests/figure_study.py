@@ -181,6 +181,19 @@ def scale_rows() -> pd.DataFrame:
     )
 
 
+def growth_rows() -> pd.DataFrame:
+    """Inference that grows with the square of the hypotheses, and with the root of the actions."""
+    value = np.array([10, 100, 1000, 3, 30, 300])
+    return pd.DataFrame(
+        {
+            "factor": ["hypotheses"] * 3 + ["actions"] * 3,
+            "value": value,
+            "discretise_s": value / 1e3,
+            "infer_s": np.append(value[:3] ** 2.0, value[3:] ** 0.5) / 1e3,
+        }
+    )
+
+
 def study_tables() -> dict[str, pd.DataFrame]:
     """All tables that figures of the paper are drawn from."""
     return {

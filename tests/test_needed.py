@@ -30,6 +30,14 @@ def test_running_needs_dependencies_and_theirs_and_no_tools() -> None:
     assert entries.count("--hash=") > len(names(entries))
 
 
+def test_what_only_the_benchmark_compares_with_is_not_locked() -> None:
+    locked = re.search(r"^LOCKED := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert locked is not None
+    assert {*locked[1].split(), "bench"} == set(PROJECT["optional-dependencies"])
+    peers = PROJECT["optional-dependencies"]["bench"]
+    assert not {re.split(r"[^\w-]", line)[0] for line in peers} & names(LOCK)
+
+
 def test_a_dependency_that_the_lock_lacks_is_named() -> None:
     with pytest.raises(SystemExit, match=r"requirements\.lock lacks unheard-of: run make lock"):
         needed(LOCK, {**PROJECT, "dependencies": ["unheard_of>=1"]}, [])

@@ -1,9 +1,13 @@
-"""Time the project and write what was found: python -m tests.benchmark [--results DIR]
+"""Time the project and write what was found: python -m tests.benchmark [--results DIR] [PART ...]
 
 Every time is processor time of one thread, so that other work on the machine matters little; a
 floor is a measured rate of this machine times the bytes or calls that an algorithm cannot do
-without. Tables go to results/benchmark/tables: `benchmark` (times), `costs` (files and memory) and
-`scale` (one task in four dimensions, from a thousand states to a million).
+without. Tables go to results/benchmark/tables: `peers` (who solves the same problem, and how fast),
+`benchmark` (times of what people wait for), `costs` (files and memory of points), `scale` (time and
+memory by states) and `growth` (by hypotheses, demonstrations, actions, steps and dimensions).
+
+Parts are safe, demonstrations, inference, waits, points and growth. Where some are named, only
+these are done, and nothing is written.
 """
 
 from __future__ import annotations
@@ -17,86 +21,126 @@ import json
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
-from tqdm import tqdm
 
 from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.study import collated, write_collated
-from tests.benchmark import kernels, sweeps
+from tests.benchmark import contest, demonstrations, growth, inference, kernels, safe_sets, sweeps
 from tests.benchmark.configs import telescope
-
-SIZES = (
-    ("telescope", (8, 5, 5, 5)),
-    ("telescope", (10, 5, 10, 5)),
-    ("telescope", (10, 10, 10, 10)),
-    ("telescope", (15, 13, 15, 11)),
-    ("telescope", (20, 16, 20, 16)),
-    ("telescope", (26, 21, 26, 21)),
-    ("telescope", (40, 25, 40, 25)),
-    ("torus", (18, 18, 18, 18)),
-    ("torus", (32, 31, 32, 32)),
-)
 
 
 def main() -> int:
     """Measure everything, print it and write the tables."""
     parser = argparse.ArgumentParser(prog="benchmark", description=__doc__)
     parser.add_argument("--results", type=Path, default=timing.ROOT / "results", metavar="DIR")
-    folder = parser.parse_args().results / "benchmark"
+    parser.add_argument("parts", nargs="*", choices=[[], *PARTS], metavar="PART")
+    arguments = parser.parse_args()
+    folder, begin = arguments.results / "benchmark", time.time()
     machine = timing.machine()
-    print(", ".join(f"{key} {value}" for key, value in machine.items()))
-    work = [
-        ("pendulum", lambda: kernels.pendulum_rows(20, 0.25, 1)),
-        ("pendulum, 1600 cells", lambda: kernels.pendulum_rows(40, 0.25, 1)),
-        ("pendulum, in-cell samples", lambda: kernels.pendulum_rows(20, 0.25, 3)),
-        ("telescope", lambda: kernels.telescope_rows(telescope(), 1)),
-        ("telescope, in-cell samples", lambda: kernels.telescope_rows(telescope(), 2)),
-        ("demonstrator", kernels.demonstrator_rows),
+    print(", ".join(f"{key} {value}" for key, value in machine.items()), end="\n\n")
+    rows: dict[str, list[Any]] = {name: [] for name in TABLES}
+    for part in arguments.parts or PARTS:
+        PARTS[part](rows)
+    print(f"{time.time() - begin:.0f} s in all")
+    if not arguments.parts:
+        _write(folder, rows, machine)
+        print(f"written: {folder / 'tables'}")
+    return 0
+
+
+def _contests(which: Iterator[contest.Contest], rows: dict[str, list[Any]]) -> None:
+    """Hold contests, and print each when it is over."""
+    for each in which:
+        found = contest.measure(each)
+        rows["peers"] += found
+        print(contest.show(found), flush=True)
+
+
+def _waits(rows: dict[str, list[Any]]) -> None:
+    """What people wait for."""
+    found = [
+        *kernels.pendulum_rows(20, 1),
+        *kernels.pendulum_rows(40, 1),
+        *kernels.pendulum_rows(20, 3),
+        *kernels.telescope_rows(telescope(), 1),
+        *kernels.telescope_rows(telescope(), 2),
+        *kernels.demonstrator_rows(),
     ]
-    sizes: list[dict[str, object]] = []
-    rows: list[timing.Row] = []
-    with tqdm(total=len(work) + 1 + len(SIZES), unit="part", disable=None) as bar:
-        for name, measure in work:
-            bar.set_postfix_str(name)
-            rows += measure()
-            bar.update()
-        bar.set_postfix_str("sweeps")
-        with tempfile.TemporaryDirectory() as scratch:
-            more, costs = sweeps.sweep_rows(Path(scratch))
-        rows += more
-        bar.update()
-        for system, shape in SIZES:
-            bar.set_postfix_str(f"{system}, {' x '.join(map(str, shape))} cells")
-            sizes.append(_apart(system, shape))
-            bar.update()
-    times = pd.DataFrame([asdict(row) for row in rows])
-    times.insert(3, "ratio", times["median_s"] / times["floor_s"])
-    tables = {
-        "benchmark": times,
-        "costs": pd.DataFrame([asdict(cost) for cost in costs]),
-        "scale": pd.DataFrame(sizes),
-    }
+    _show_times(found)
+    rows["benchmark"] += map(asdict, found)
+
+
+def _points(rows: dict[str, list[Any]]) -> None:
+    """What points of a sweep cost beside their own work."""
+    with tempfile.TemporaryDirectory() as scratch:
+        found, costs = sweeps.sweep_rows(Path(scratch))
+    _show_times(found)
+    for cost in costs:
+        print(f"{cost.value:>10.3g} {cost.unit:<6}  {cost.what}")
+    rows["benchmark"] += map(asdict, found)
+    rows["costs"] += map(asdict, costs)
+
+
+def _growth(rows: dict[str, list[Any]]) -> None:
+    """How time and memory grow, each size in a process of its own."""
+    print(f"\n{'':<22}{'discretise':>11}{'infer':>10}{'slopes':>13}{'peak':>9}{'floor':>9}")
+    for factor, sizes in growth.FACTORS.items():
+        before: dict[str, Any] | None = None
+        for value in sizes:
+            row = _apart(factor, value)
+            rows["scale" if factor in ("states", "torus_states") else "growth"].append(row)
+            slopes = ""
+            if before is not None:
+                more = np.log(value / before["value"])
+                slopes = " ".join(
+                    f"{np.log(row[name] / before[name]) / more:6.2f}"
+                    for name in ("discretise_s", "infer_s")
+                )
+            times = (contest.in_units(row[name]) for name in ("discretise_s", "infer_s"))
+            name = f"{factor.replace('_', ' ')} {value}"
+            print(f"{name:<22}{next(times):>11}{next(times):>10}{slopes:>13}", end="")
+            print(f"{row['peak_mb']:>6.0f} MB{row['floor_mb']:>6.0f} MB", flush=True)
+            before = row
+
+
+TABLES = ("peers", "benchmark", "costs", "scale", "growth")
+PARTS: dict[str, Callable[[dict[str, list[Any]]], None]] = {
+    "safe": lambda rows: _contests(safe_sets.contests(), rows),
+    "demonstrations": lambda rows: _contests(demonstrations.contests(), rows),
+    "inference": lambda rows: _contests(inference.contests(), rows),
+    "waits": _waits,
+    "points": _points,
+    "growth": _growth,
+}
+
+
+def _write(folder: Path, rows: dict[str, list[Any]], machine: dict[str, Any]) -> None:
+    """The tables, with the machine in each row."""
     digests = {}
-    for name, table in tables.items():
+    for name, found in rows.items():
+        table = pd.DataFrame(found)
+        if name == "benchmark":
+            table.insert(3, "ratio", table["median_s"] / table["floor_s"])
         for column, value in machine.items():
             table[column] = value
         content = csv_bytes(_round(table))
         digests[f"{name}.csv"] = digest(content)
         replace_file(folder / "tables" / f"{name}.csv", content)
     write_collated(folder, collated({}, digests))  # so that who reads the tables can check them
-    _show(tables)
-    print(f"written: {folder / 'tables'}")
-    return 0
 
 
-def _apart(system: str, shape: tuple[int, ...]) -> dict[str, object]:
-    """A size of the scale table, in a process whose memory is its own."""
-    command = [sys.executable, "-m", "tests.benchmark.scale", system, *map(str, shape)]
+def _apart(factor: str, value: int) -> dict[str, Any]:
+    """A row of the growth table, in a process whose memory is its own."""
+    command = [sys.executable, "-m", "tests.benchmark.growth", factor, str(value)]
     done = subprocess.run(command, cwd=timing.ROOT, stdout=subprocess.PIPE, text=True, check=True)
-    row: dict[str, object] = json.loads(done.stdout)
+    row: dict[str, Any] = json.loads(done.stdout)
     return row
 
 
@@ -106,20 +150,11 @@ def _round(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**{name: table[name].map(lambda x: float(f"{x:.3g}")) for name in floats})
 
 
-def _show(tables: dict[str, pd.DataFrame]) -> None:
-    """Print what was measured."""
-    print(f"\n{'median [ms]':>12} {'floor [ms]':>11} {'ratio':>6}  what (paper: its statement)")
-    for row in tables["benchmark"].itertuples():
-        known = row.floor_s == row.floor_s
-        bound = f"{1e3 * row.floor_s:11.3f} {row.ratio:6.1f}" if known else f"{'-':>11} {'-':>6}"
+def _show_times(rows: list[timing.Row]) -> None:
+    """Print times, and what the paper says of them."""
+    for row in rows:
         said = f" (paper: {row.paper})" if row.paper else ""
-        print(f"{1e3 * row.median_s:12.3f} {bound}  {row.what}{said}")
-    print()
-    for cost in tables["costs"].itertuples():
-        print(f"{cost.value:12.3g} {cost.unit:<6}  {cost.what}")
-    print()
-    columns = ["system", "states", "largest_active_share", "discretise_s", "infer_s", "peak_mb"]
-    print(tables["scale"][columns].to_string(index=False))
+        print(f"{contest.in_units(row.median_s):>10}  {row.what}{said}")
 
 
 if __name__ == "__main__":

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ[_name] = "1"
+os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+os.environ["JAX_PLATFORMS"] = "cpu"
 
 import platform
 import subprocess
@@ -71,6 +73,14 @@ def copy_rate(size: int) -> float:
     repeats = max(1, (1 << 26) // size)
     seconds = median_seconds(lambda: [np.copyto(target, source) for _ in range(repeats)])
     return 2 * size * repeats / seconds
+
+
+def exp_seconds(count: int) -> float:
+    """Seconds of so many exponentials, at the rate of an array that stays in the cache."""
+    values = np.full(1 << 12, -1.0)
+    repeats = 16
+    seconds = median_seconds(lambda: [np.exp(values) for _ in range(repeats)])
+    return seconds * count / (repeats * values.size)
 
 
 def machine() -> dict[str, str | int]:

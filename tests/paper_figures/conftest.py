@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import pandas as pd
 import pytest
 from choice_studies import choice_tables
-from figure_study import scale_rows, study_tables
+from figure_study import growth_rows, scale_rows, study_tables
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 @cache
 def all_tables() -> dict[str, dict[str, pd.DataFrame]]:
     """Tables by figure, where they are those of another study than the paper's."""
-    return {**choice_tables(), "time_and_memory": {"scale": scale_rows()}, "": study_tables()}
+    sizes = {"scale": scale_rows(), "growth": growth_rows()}
+    return {**choice_tables(), "time_and_memory": sizes, "": study_tables()}
 
 
 def tables_for(module: ModuleType) -> dict[str, pd.DataFrame]:
