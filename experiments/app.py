@@ -66,7 +66,7 @@ def run_command(
     act: Callable[[dict[str, Any]], int],
     failures: tuple[type[Exception], ...] = (),
     *,
-    may_sweep: bool = False,
+    register_sweeper: Callable[[], None] | None = None,
 ) -> int:
     """Compose a config from the command line, and act on it.
 
@@ -74,14 +74,15 @@ def run_command(
         config_name: a file of conf/.
         act: takes the resolved config and returns the exit status.
         failures: errors that say all there is to say.
-        may_sweep: whether a config may ask for a sweep without -m. Hydra's own way composes twice
-            to know that, and so is taken by other commands only where it is given options.
+        register_sweeper: makes known to Hydra what runs a sweep; None for a command that has none.
+            A config may ask for a sweep without -m.
 
     Returns:
         the status of `act`; FAILED, REFUSED for a wrong config, or STOPPED after Ctrl-C.
     """
     import hydra
     from hydra.core.hydra_config import HydraConfig
+    from hydra.types import RunMode
     from omegaconf import DictConfig
 
     from experiments.config.command_line import command_words
@@ -108,14 +109,26 @@ def run_command(
         if status != DONE:
             raise SystemExit(status)
 
+    def composed(words: list[str]) -> DictConfig | None:
+        """The config, composed once; None if it asks for a sweep, or Hydra says what is wrong."""
+        try:
+            with hydra.initialize_config_dir(str(CONF), **version_base()):
+                config = hydra.compose(config_name, words, return_hydra_config=True)
+        except Exception:
+            if register_sweeper is None:
+                raise
+            return None
+        return None if config.hydra.mode is RunMode.MULTIRUN else config
+
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises its errors, and they are worded here
     try:
         sys.argv[1:] = words = command_words(sys.argv[1:])
-        if may_sweep or any(word.startswith("-") for word in words):
+        config = None if any(word.startswith("-") for word in words) else composed(words)
+        if config is None:  # Hydra's own way, which composes twice or more
+            if register_sweeper is not None:
+                register_sweeper()
             hydra.main(config_path=str(CONF), config_name=config_name, **version_base())(task)()
         else:
-            with hydra.initialize_config_dir(str(CONF), **version_base()):
-                config = hydra.compose(config_name, words, return_hydra_config=True)
             HydraConfig.instance().set_config(config)  # for interpolations
             task(config)
     except KeyboardInterrupt:

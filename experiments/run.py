@@ -18,8 +18,8 @@ from experiments.app import DONE, STOPPED, run_command
 from experiments.collate.finished import CollateError
 from experiments.config.read import ConfigError
 from experiments.point.no_answer import NoAnswer
-from experiments.sweep.planner import SweepFailed
-from experiments.sweep.plugins import register_plugins
+from experiments.sweep.messages import SweepFailed
+from experiments.sweep.plugins import register_options, register_plugins
 from experiments.sweep.worker import run_single
 
 _SWEEP = ("params", "settings", "cases")
@@ -30,9 +30,12 @@ def main() -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a clean stop, as after Ctrl-C
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # which it is below nohup
         signal.signal(signal.SIGHUP, signal.default_int_handler)
-    register_plugins()
+    register_options()
     status = run_command(
-        "config", _run_single, failures=(SweepFailed, CollateError, NoAnswer), may_sweep=True
+        "config",
+        _run_single,
+        failures=(SweepFailed, CollateError, NoAnswer),
+        register_sweeper=register_plugins,
     )
     if status == STOPPED:
         print("stopped; what has finished is kept: the same command runs the rest", file=sys.stderr)

@@ -27,6 +27,8 @@ V       values                safe set's value function                  unit of
 ======  ====================  =========================================  ==============
 """
 
+from typing import TYPE_CHECKING, Any
+
 from mlci.calibration import Calibration, calibrate
 from mlci.causal_entropy import CausalEntropy
 from mlci.crossings import Crossing
@@ -41,8 +43,6 @@ from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.preparation import PreparedInference, infer, prepare
 from mlci.reachability import SafeSet, solve_safe_set
-from mlci.recordings.read import read_demonstrations
-from mlci.recordings.write import write_demonstration
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter
 from mlci.selection import Selection, select_constraints
@@ -58,6 +58,10 @@ from mlci.systems import (
 )
 from mlci.tables import Table, TablePath, TableRegion
 from mlci.tabular import TabularModel, action_grid, discretize
+
+if TYPE_CHECKING:
+    from mlci.recordings.read import read_demonstrations
+    from mlci.recordings.write import write_demonstration
 
 __all__ = [
     "Box",
@@ -106,3 +110,16 @@ __all__ = [
 ]
 
 __version__ = "0.4.0"
+
+
+def __getattr__(name: str) -> Any:
+    """What reads and writes recordings; it needs pandas, which takes longer than all the rest."""
+    if name == "read_demonstrations":
+        from mlci.recordings.read import read_demonstrations
+
+        return read_demonstrations
+    if name == "write_demonstration":
+        from mlci.recordings.write import write_demonstration
+
+        return write_demonstration
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from mlci.evidence import rank_scores
 from mlci.regions import Regions
@@ -111,6 +110,8 @@ def _joined(hypotheses: Regions, numbers: Ints) -> list[Ints]:
     if not len(numbers):
         return []
     mask = np.isin(np.arange(len(hypotheses)), numbers)
+    from scipy.sparse import csgraph
+
     count, group = csgraph.connected_components(neighbours(hypotheses.select(mask)), directed=False)
     return [numbers[group == k] for k in range(count)]
 

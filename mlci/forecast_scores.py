@@ -7,13 +7,16 @@ intervals are of a bootstrap over tasks.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from mlci.forecasts import checked_forecasts
 from mlci.spaces import Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Forecasts are counted between these probabilities of crossing.
 EDGES = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -65,6 +68,8 @@ def score_forecasts(
     Raises:
         ValueError: shapes that disagree, or no pair that counts.
     """
+    import pandas as pd
+
     alpha, crossed = checked_forecasts(avoidance, violated)
     use = np.asarray(counts, dtype=bool)
     if not use.any():

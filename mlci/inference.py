@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from mlci.credible_sets import CredibleSet, credible_set
@@ -22,6 +21,9 @@ from mlci.forecasts import ForecastMap, is_possible, region_sizes
 from mlci.regions import Regions
 from mlci.rule_breaking import RateEstimate, estimate_rule_breaking
 from mlci.spaces import Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _ROWS_OF_REPR, _ROWS_OF_SUMMARY = 5, 10
 
@@ -198,6 +200,8 @@ class Inference:
             [unit]` and `<name> to [unit]`; `outcome`, see `outcomes`; `rank`, `gain` [nat], missing
             where it is unavoidable; `posterior`; and `violated_by`, the number of demonstrations.
         """
+        import pandas as pd
+
         space, columns = self.hypotheses.space, {"hypothesis": np.array(self.hypotheses.names)}
         for d, (name, unit) in enumerate(zip(space.names, space.units, strict=True)):
             lower, upper = self.hypotheses.lower[:, d], self.hypotheses.upper[:, d]
@@ -234,6 +238,8 @@ class Inference:
     def evidence_frame(self) -> pd.DataFrame:
         """A row a demonstration and hypothesis: `probability`, Phi; `forecast`, as it counts;
         `violated`; `evidence` [nat]."""
+        import pandas as pd
+
         pairs = [np.array(names, dtype=object) for names in (self.names, self.hypotheses.names)]
         demonstrations, hypotheses = np.meshgrid(*pairs, indexing="ij")
         columns = {

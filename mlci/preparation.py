@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 
 from mlci.crossings import ANY, Crossing, crossed
@@ -234,6 +233,8 @@ def prepare(
     reachable = np.zeros(len(tasks), dtype=bool)
     if tasks:
         _ = model.merged  # once for all tasks
+    from joblib import Parallel, delayed
+
     # Threads, as machine code does the work.
     work = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")(
         delayed(_avoidance_probabilities)(distribution) for distribution in distributions

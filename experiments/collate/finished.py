@@ -8,13 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from experiments.tracking.files import digest, read_file
 from experiments.tracking.points import Point
 from experiments.tracking.trees import flatten
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LAST_OPENING = "seed"  # the last of the columns that open a point's tables
 
@@ -69,6 +70,8 @@ class FinishedPoint:
 
     def table(self, name: str) -> pd.DataFrame:
         """A table of strings; errors as of `content`."""
+        import pandas as pd
+
         # As objects: pandas' own type for strings is slower to read and to write.
         return pd.read_csv(io.BytesIO(self.content(name)), dtype=object, keep_default_na=False)
 

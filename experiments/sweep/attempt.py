@@ -9,12 +9,10 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
-import pandas as pd
 from filelock import Timeout
 
-import experiments.point.run
 from experiments.config.settings import Settings
 from experiments.point.no_answer import NoAnswer
 from experiments.sweep.crash_trace import crash_trace, take_crash_trace
@@ -23,6 +21,9 @@ from experiments.tracking.environment import reset_peak_memory
 from experiments.tracking.files import PART, growing
 from experiments.tracking.points import Point, State
 from experiments.tracking.store import Store
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def run_here(
@@ -137,6 +138,8 @@ def _compute(
     point: Point, settings: Settings, store: Store, log: Callable[[str], None] | None
 ) -> Mapping[str, pd.DataFrame]:
     """The point's tables; its lines, and its traceback, go to its log."""
+    from experiments.point.run import run_point  # all that computes, only where a point runs
+
     with (
         growing(point.folder / "log.txt") as file,
         _output_to(file) if log is None else nullcontext(),
@@ -149,7 +152,7 @@ def _compute(
                 log(line)
 
         try:
-            return experiments.point.run.run_point(settings, store, write_line)
+            return run_point(settings, store, write_line)
         except Exception as error:
             file.write(_trace(error) or f"{error}\n")
             raise

@@ -9,6 +9,10 @@ from experiments.sweep.runner import Outcome
 from experiments.terminal import counted
 
 
+class SweepFailed(Exception):
+    """Some points failed; the message describes each."""
+
+
 def describe_problems(problems: Mapping[str, Sequence[str]], total: int) -> str:
     """The problems of a sweep's configs: each once, with the points that have it.
 

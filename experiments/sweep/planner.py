@@ -14,14 +14,13 @@ from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig
 from tqdm import tqdm
 
-from experiments.collate.join import collate
 from experiments.config.explain import explain
 from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, resolved_tree, writable_results
 from experiments.config.settings import StudySettings, SweepSettings
 from experiments.sweep.combinations import Combinations
 from experiments.sweep.composer import Composer
-from experiments.sweep.messages import describe_failures, describe_problems
+from experiments.sweep.messages import SweepFailed, describe_failures, describe_problems
 from experiments.sweep.plan import Job, PlannedPoint, count_states, read_point, select_points
 from experiments.sweep.pool import PoolLauncher
 from experiments.sweep.runner import run_points
@@ -31,10 +30,6 @@ from experiments.tracking.files import digest
 from experiments.tracking.locks import StudyInUse, plan_lock, publication_lock, sweep_lock
 from experiments.tracking.points import State
 from experiments.tracking.study import whole_study, write_plan
-
-
-class SweepFailed(Exception):
-    """Some points failed; the message describes each."""
 
 
 class Planner(Sweeper):
@@ -105,6 +100,8 @@ class Planner(Sweeper):
             left = len(plan) - len(finished)
             print(f"{left} of {counted(len(plan), 'point')} left, and no table is written")
             return
+        from experiments.collate.join import collate  # pandas
+
         points = [planned.point for planned in plan]
         with publication_lock(folder):
             for table in collate(points, folder, mixed=options.mix_sources):

@@ -5,12 +5,6 @@ from __future__ import annotations
 from functools import cache
 
 from hydra.core.config_store import ConfigStore
-from hydra.core.plugins import Plugins
-
-from experiments.sweep.dask_jobs import DaskLauncher
-from experiments.sweep.planner import Planner
-from experiments.sweep.pool import PoolLauncher
-from experiments.sweep.slurm import SlurmLauncher
 
 _PLANNER = {"params": None, "settings": None, "cases": None, "ends": False}
 
@@ -36,24 +30,34 @@ _DASK = {
     "fail_fast": "${sweep.fail_fast}",
 }
 
+_POOL = {"workers": "${workers}", "fail_fast": "${sweep.fail_fast}"}
+
 
 @cache  # Hydra 1.4 wants them once
+def register_options() -> None:
+    """Make known to Hydra which options sweeper and launchers have: all that a config needs."""
+    for group, name, plugin, settings in (
+        ("hydra/sweeper", "planner", "planner.Planner", _PLANNER),
+        ("hydra/launcher", "pool", "pool.PoolLauncher", _POOL),
+        ("hydra/launcher", "slurm", "slurm.SlurmLauncher", _SLURM),
+        ("hydra/launcher", "dask", "dask_jobs.DaskLauncher", _DASK),
+    ):
+        node = {"_target_": f"experiments.sweep.{plugin}", **settings}
+        ConfigStore.instance().store(group=group, name=name, node=node, provider="mlci")
+
+
+@cache
 def register_plugins() -> None:
     """Make the sweeper and the launchers known to Hydra, however the project is installed."""
+    from hydra.core.plugins import Plugins
+
+    from experiments.sweep.dask_jobs import DaskLauncher
+    from experiments.sweep.planner import Planner
+    from experiments.sweep.pool import PoolLauncher
+    from experiments.sweep.slurm import SlurmLauncher
+
+    register_options()
     # Hydra 1.3 accepts plugins of the package `hydra_plugins` only; 1.4 has no such rule.
     Plugins.is_in_toplevel_plugins_module = staticmethod(lambda target: True)  # type: ignore[assignment, method-assign]
-    for group, name, plugin, settings in (
-        ("hydra/sweeper", "planner", Planner, _PLANNER),
-        (
-            "hydra/launcher",
-            "pool",
-            PoolLauncher,
-            {"workers": "${workers}", "fail_fast": "${sweep.fail_fast}"},
-        ),
-        ("hydra/launcher", "slurm", SlurmLauncher, _SLURM),
-        ("hydra/launcher", "dask", DaskLauncher, _DASK),
-    ):
+    for plugin in (Planner, PoolLauncher, SlurmLauncher, DaskLauncher):
         Plugins.instance().register(plugin)
-        target = f"{plugin.__module__}.{plugin.__name__}"
-        node = {"_target_": target, **settings}
-        ConfigStore.instance().store(group=group, name=name, node=node, provider="mlci")

@@ -6,18 +6,17 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from experiments.config.settings import Settings
-from experiments.point.tables import table_bytes
 from experiments.tracking.environment import environment, peak_memory
 from experiments.tracking.files import digest, read_file, replace_file
 from experiments.tracking.points import Point
 from experiments.tracking.store import Store
-from experiments.tracking.tables import rounded
 from experiments.tracking.trees import plain
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def write_result(
@@ -36,6 +35,9 @@ def write_result(
         store: the store that it used, which knows stages and times.
         attempt: number and start of the attempt.
     """
+    from experiments.point.tables import table_bytes
+    from experiments.tracking.tables import rounded
+
     files = {"log.txt": digest(read_file(point.folder / "log.txt"))}
     for name, frame in sorted(tables.items()):
         data = table_bytes(name, frame, settings)

@@ -15,8 +15,10 @@ from functools import cache
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from experiments.tracking.files import digest
+from experiments.tracking.source_memory import SourceMemory
 from experiments.tracking.trees import canonical_json
 
 # Imports from these packages count wherever they occur, by their source; others by their version.
@@ -35,6 +37,9 @@ _PLUMBING = {
 # Modules that word and show what is said to people, and what says it.
 _WORDS = ("experiments.console", "experiments.terminal", "experiments.progress")
 _SPEAKERS = {"print", "log", "_log", "write_line", "begin"}
+# Whose files are remembered: all in the checkout, or beside an installed wheel.
+_ROOT = Path(__file__).parents[2]
+_MEMORY = SourceMemory(__file__)
 
 
 def source_hash(modules: Iterable[str], alone: Iterable[str] = ()) -> str:
@@ -65,6 +70,7 @@ def source_hash(modules: Iterable[str], alone: Iterable[str] = ()) -> str:
             else:
                 outside.add(top)
     sources |= {name: _read_source(name)[0] for name in alone}
+    _MEMORY.save()
     versions = {name: it for name in outside if (it := _version(name)) is not None}
     return digest(canonical_json({"sources": sources, "versions": versions}))
 
@@ -98,19 +104,35 @@ def _read_source(name: str) -> tuple[str, tuple[str, ...]]:
     spec = _find(name)
     if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
         return "", ()
-    tree = ast.parse(Path(spec.origin).read_bytes())
+    is_ours = Path(spec.origin).is_relative_to(_ROOT)
+    code, imports = _MEMORY.recall(spec.origin, _parsed) if is_ours else _parsed(spec.origin)
     imported: list[str] = []
+    for start, names in imports:
+        if names is None:
+            imported.append(start)
+            continue
+        origin = importlib.util.resolve_name(start, spec.parent)
+        imported.append(origin)
+        # `from package import module` names a module only if it is one.
+        inner = [f"{origin}.{name}" for name in names]
+        imported += [other for other in inner if other in _module_names(origin)]
+    return code, tuple(imported)
+
+
+def _parsed(path: str) -> list[Any]:
+    """Digest of the code of a file; and its imports, each with the names that it takes from there.
+
+    No names are those of `import module`, an empty list that of none.
+    """
+    tree = ast.parse(Path(path).read_bytes())
+    imports: list[list[Any]] = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            imported += [alias.name for alias in node.names]
+            imports += [[alias.name, None] for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             start = "." * node.level + (node.module or "")
-            origin = importlib.util.resolve_name(start, spec.parent)
-            imported.append(origin)
-            # `from package import module` names a module only if it is one.
-            inner = [f"{origin}.{alias.name}" for alias in node.names]
-            imported += [other for other in inner if other in _module_names(origin)]
-    return digest("\n".join(_words(tree)).encode()), tuple(imported)
+            imports.append([start, [alias.name for alias in node.names]])
+    return [digest("\n".join(_words(tree)).encode()), imports]
 
 
 def _words(tree: ast.AST) -> list[str]:

@@ -8,10 +8,13 @@ import time
 from pathlib import Path
 
 import pytest
+from hydra._internal.config_loader_impl import ConfigLoaderImpl
 from sweeps import gone
+from tiny_point import TINY
 
-from experiments.app import FAILED, run_command
+from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import CHECKOUT
+from experiments.sweep.plugins import register_options, register_plugins
 
 # A command, and a word in the name of the first module that takes time.
 COMMANDS = {
@@ -70,3 +73,66 @@ def test_a_reader_that_has_gone_and_a_full_disk_leave_no_traceback(
         assert "Traceback" not in err
         assert told in err
         assert len(err.splitlines()) == len(told[:1])
+
+
+HEAVY = set("numpy pandas scipy numba hydra omegaconf pydantic matplotlib tqdm".split())
+LOADED = """
+import runpy, sys
+sys.path.insert(0, {checkout!r})
+sys.argv[1:] = {words!r}
+sys.argv[0] = {script!r}
+try:
+    runpy.run_path(sys.argv[0], run_name="__main__")
+except SystemExit as end:
+    assert not end.code, end.code
+print("loaded", *sorted({{name.split(".")[0] for name in sys.modules}} & {heavy!r}))
+"""
+
+
+def loaded(script: str, *words: str) -> set[str]:
+    """The packages that take time to load, of those that a command has loaded when it ends."""
+    path = str(CHECKOUT / "experiments" / script)
+    code = LOADED.format(checkout=str(CHECKOUT), script=path, words=list(words), heavy=HEAVY)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split()[1:])
+
+
+@pytest.mark.parametrize(
+    ("script", "words"),
+    [
+        *((script, ["--help"]) for script in ("run.py", "infer.py", "advise.py")),
+        ("run.py", ["--version"]),
+        ("results.py", ["status"]),
+        ("results.py", ["list", "paper"]),
+    ],
+)
+def test_what_answers_at_once_loads_nothing_that_takes_time(script: str, words: list[str]) -> None:
+    assert loaded(script, *words) == set()
+
+
+def test_a_point_that_is_done_loads_what_reads_a_config_and_nothing_that_computes(
+    tmp_path: Path,
+) -> None:
+    words = [*TINY, f"results={tmp_path}"]
+    assert "pandas" in loaded("run.py", *words)
+    assert not loaded("run.py", *words) & {"pandas", "numba", "matplotlib"}
+
+
+@pytest.mark.parametrize("words", [["dt=0.25"], ["dt=0.25", "hydra.mode=RUN"]])
+def test_a_single_config_is_composed_once(
+    words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    composed = []
+    load = ConfigLoaderImpl.load_configuration
+    monkeypatch.setattr(
+        ConfigLoaderImpl,
+        "load_configuration",
+        lambda *args, **options: composed.append(args) or load(*args, **options),
+    )
+    monkeypatch.setattr(sys, "argv", ["run.py", *words])
+    register_options()
+    seen: list[float] = []
+    status = run_command(
+        "config", lambda tree: seen.append(tree["dt"]) or DONE, register_sweeper=register_plugins
+    )
+    assert (status, seen, len(composed)) == (DONE, [0.25], 1)
