@@ -1,6 +1,7 @@
 """Which step a command is at, on the last line of a terminal.
 
-Whatever takes time calls `begin` with the step's name, wherever it is; `steps_shown` listens.
+Whatever takes time calls `begin` with the step's name, wherever it is; `steps_shown` listens. It
+also shows that loops are compiled, which mlci logs the first time that a machine needs them.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 from tqdm import tqdm
 
 _LOG = logging.getLogger(__name__)
+_COMPILES = logging.getLogger("mlci.compiled")
 _PAUSE = 0.5  # [s] between looks at the clock
 
 
@@ -29,7 +31,8 @@ def steps_shown() -> Iterator[None]:
         if bar.disable:
             yield
             return
-        handler, before, ended = _Shown(bar), _LOG.level, threading.Event()
+        handler, ended = _Shown(bar), threading.Event()
+        before = {log: log.level for log in (_LOG, _COMPILES)}
 
         def tick() -> None:
             while not ended.wait(_PAUSE):
@@ -37,14 +40,16 @@ def steps_shown() -> Iterator[None]:
                     bar.refresh()
 
         clock = threading.Thread(target=tick, daemon=True)
-        _LOG.addHandler(handler)
-        _LOG.setLevel(logging.INFO)
+        for log in before:
+            log.addHandler(handler)
+            log.setLevel(logging.INFO)
         clock.start()
         try:
             yield
         finally:
-            _LOG.removeHandler(handler)
-            _LOG.setLevel(before)
+            for log, level in before.items():
+                log.removeHandler(handler)
+                log.setLevel(level)
             ended.set()
             clock.join()
 
@@ -55,10 +60,16 @@ class _Shown(logging.Handler):
     def __init__(self, bar: tqdm[Any]) -> None:
         super().__init__()
         self._bar = bar
+        self._step = ""
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._bar.set_description_str(record.getMessage(), refresh=False)
-        if record.getMessage():
+        text = record.getMessage()
+        if record.name == _LOG.name:
+            self._step = text
+        elif self._step:
+            text = f"{self._step}: {text}"
+        self._bar.set_description_str(text, refresh=False)
+        if text:
             self._bar.refresh()
         else:
             self._bar.clear()

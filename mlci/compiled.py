@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from types import FunctionType
 from typing import Any, cast
 
@@ -48,12 +49,31 @@ class Compiled:
             function.__module__ = self.function.__module__
             compile_it = cast(Any, numba.njit)
             options = {"nogil": True, "error_model": "numpy"}
-            _LOG.info("compiling, once on this machine")
-            try:
-                self._machine_code = compile_it(self.signature, cache=True, **options)(function)
-            except RuntimeError:  # no folder can be written to
-                self._machine_code = compile_it(self.signature, **options)(function)
+            with _told(function):
+                try:
+                    self._machine_code = compile_it(self.signature, cache=True, **options)(function)
+                except RuntimeError:  # no folder can be written to
+                    self._machine_code = compile_it(self.signature, **options)(function)
         return self._machine_code
+
+
+def _told(function: FunctionType) -> AbstractContextManager[None]:
+    """Says so on the module's logger if a function is compiled, and not read from disk."""
+    from numba.core import event
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: Any) -> None:
+            self._say(event, "compiling, once on this machine")
+
+        def on_end(self, event: Any) -> None:
+            self._say(event, "compiled")
+
+        def _say(self, event: Any, words: str) -> None:
+            if event.data["dispatcher"].py_func is function:  # and not what it calls
+                _LOG.info(words)
+
+    told: AbstractContextManager[None] = event.install_listener("numba:compile", Listener())
+    return told
 
 
 def compiled(signature: str) -> Callable[[Callable[..., Any]], Compiled]:

@@ -75,7 +75,10 @@ def test_a_reader_that_has_gone_and_a_full_disk_leave_no_traceback(
         assert len(err.splitlines()) == len(told[:1])
 
 
-HEAVY = set("numpy pandas scipy numba hydra omegaconf pydantic matplotlib tqdm".split())
+HEAVY = {
+    *("numpy", "pandas", "scipy", "numba", "matplotlib"),
+    *("hydra", "omegaconf", "pydantic", "tqdm"),
+}
 LOADED = """
 import runpy, sys
 sys.path.insert(0, {checkout!r})

@@ -36,6 +36,24 @@ def test_steps_are_shown_one_after_the_other_on_a_terminal(monkeypatch: pytest.M
     assert not logging.getLogger("experiments.progress").handlers
 
 
+@steps_shown()
+def first_work_on_a_machine() -> None:
+    begin("ranking")
+    logging.getLogger("mlci.compiled").info("compiling")
+    logging.getLogger("mlci.compiled").info("compiled")
+    begin("measuring")
+
+
+def test_a_terminal_shows_what_is_compiled_beside_the_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    first_work_on_a_machine()
+    lines = [line.partition("[")[0].strip() for line in terminal.getvalue().split("\r")]
+    steps = ["ranking", "ranking: compiling", "ranking: compiled", "measuring"]
+    assert [line for line in lines if line] == steps
+    assert not logging.getLogger("mlci.compiled").handlers
+
+
 def test_nothing_is_shown_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     file = io.StringIO()
     monkeypatch.setattr("sys.stderr", file)

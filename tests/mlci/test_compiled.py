@@ -56,12 +56,18 @@ def test_other_types_than_those_of_the_signature_are_refused(loops: ModuleType) 
         loops.running_norm(np.zeros((2, 2)), np.zeros(2))
 
 
-def test_machine_code_is_kept_on_disk_and_read_again(loops: ModuleType, tmp_path: Path) -> None:
+def test_machine_code_is_kept_on_disk_and_read_again(
+    loops: ModuleType, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "mlci.compiled")
     loops.square(2.0)
+    assert caplog.messages == ["compiling, once on this machine", "compiled"]
+    caplog.clear()
     kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")}
     assert len(kept) == 1
     assert Compiled(loops.square.function, loops.square.signature)(3.0) == 9
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")} == kept
+    assert not caplog.messages
 
 
 def test_where_nothing_can_be_kept_it_still_runs(
