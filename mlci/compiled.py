@@ -61,7 +61,7 @@ def _told(function: FunctionType) -> AbstractContextManager[None]:
     """Says so on the module's logger if a function is compiled, and not read from disk."""
     from numba.core import event
 
-    class Listener(event.Listener):  # type: ignore[misc]
+    class Listener(event.Listener):
         def on_start(self, event: Any) -> None:
             self._say(event, "compiling, once on this machine")
 

@@ -14,14 +14,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from mlci.first_exit import FirstExit
 from mlci.fixed_horizon import FixedHorizon
 from mlci.spaces import Bools, Floats, Ints
 from mlci.tables import Table, TablePath
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _TIE = 1e-9  # nat: decreases closer than this are equal, and the first hypothesis is taken
 
@@ -50,6 +53,8 @@ class Selection:
 
     def to_frame(self) -> pd.DataFrame:
         """A row for each constraint in order: `hypothesis`, `decrease` of KL, and `kl` after it."""
+        import pandas as pd
+
         return pd.DataFrame(
             {
                 "hypothesis": [self.names[i] for i in self.added],
