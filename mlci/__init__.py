@@ -46,6 +46,7 @@ from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter
 from mlci.selection import Selection, select_constraints
+from mlci.sets import SetPosterior, infer_sets
 from mlci.simulate import rollout
 from mlci.spaces import Box, StateSpace
 from mlci.system_check import check_affine, check_system
@@ -83,6 +84,7 @@ __all__ = [
     "SafeSet",
     "SafetyFilter",
     "Selection",
+    "SetPosterior",
     "StateSpace",
     "System",
     "Table",
@@ -100,6 +102,7 @@ __all__ = [
     "diagnose",
     "discretize",
     "infer",
+    "infer_sets",
     "prepare",
     "read_demonstrations",
     "rollout",

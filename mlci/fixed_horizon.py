@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mlci.joint_avoidance import joint_avoidance
 from mlci.merged_moves import MergedMoves
 from mlci.recursions import Leg, backward_pass, reachable_cells
 from mlci.spaces import Floats, Ints
@@ -80,10 +81,25 @@ class FixedHorizon:
 
     def _backward_pass(self, start: int, regions: int) -> tuple[Floats, Floats]:
         """log_z (T+1, S) of all starts, and alpha (C,) of one."""
-        table = self.table
-        goals = table.goals if len(table.goals) else np.arange(table.states)
-        reachable = reachable_cells(self._leg[0], np.flatnonzero(table.start), self.steps)
-        return backward_pass([self._leg], reachable, goals, start, regions)
+        reachable = reachable_cells(self._leg[0], np.flatnonzero(self.table.start), self.steps)
+        return backward_pass([self._leg], reachable, self._ends, start, regions)
+
+    def joint_avoidance_probabilities(self, start: int) -> Floats:
+        """alpha_ij (C, C): that it makes no move of region i nor of j.
+
+        Raises:
+            ValueError: no trajectory from there ends in a goal.
+        """
+        self._require_possible(np.array([start]))
+        reachable = reachable_cells(self._leg[0], [start], self.steps)
+        count = len(self.table.regions)
+        return joint_avoidance([self._leg], reachable, self._ends, start, count)
+
+    @property
+    def _ends(self) -> Ints:
+        """(G,) states in which a trajectory may end."""
+        goals = self.table.goals
+        return goals if len(goals) else np.arange(self.table.states)
 
     @cached_property
     def _leg(self) -> Leg:

@@ -15,6 +15,7 @@ import numpy as np
 
 from mlci.demonstrations import Task
 from mlci.end_moves import first_moves, last_moves, only_moves
+from mlci.joint_avoidance import joint_avoidance
 from mlci.merged_moves import MergedMoves
 from mlci.recursions import Leg, backward_pass, move_probabilities, reachable_cells
 from mlci.simulate import step_count
@@ -194,6 +195,16 @@ class TrajectoryDistribution:
         log_z, alpha = backward_pass(self._legs, self.reachable, self.goal, self.start, regions)
         vars(self)["log_z"] = log_z  # it comes along
         return alpha
+
+    def joint_avoidance_probabilities(self) -> Floats:
+        """alpha_ij (C, C): the probability that a trajectory crosses neither region i nor j.
+
+        Raises:
+            ValueError: no trajectory reaches a goal.
+        """
+        self._require_possible("probabilities are not defined")
+        count = len(self.model.regions)
+        return joint_avoidance(self._legs, self.reachable, self.goal, self.start, count)
 
     def violation_probabilities(self) -> Floats:
         """Phi_(i,T) = 1 - alpha_i (C,): the probability that a trajectory crosses region i."""

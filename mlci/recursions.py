@@ -33,9 +33,9 @@ def reachable_cells(moves: MergedMoves, starts: Ints | Sequence[int], steps: int
 
 
 def backward_pass(
-    legs: Sequence[Leg], reachable: Bools, goal: Ints, start: int, regions: int
+    legs: Sequence[Leg], reachable: Bools, goal: Ints, start: int, regions: int, skip: int = 0
 ) -> tuple[Floats, Floats]:
-    """log_z (T+1, S) [nat] of reachable cells (T+1, S), and alpha_0 (C,) of the start.
+    """log_z (T+1, S) [nat] of reachable cells (T+1, S), and alpha_0 (C - skip,) of the start.
 
     Args:
         legs: the moves of each part of the way, in order.
@@ -43,20 +43,22 @@ def backward_pass(
         goal: (G,) the goal cells.
         start: the start cell.
         regions: C, the number of regions; 0 takes log_z alone.
+        skip: how many of the first regions to leave out.
     """
     states, last = reachable.shape[1], len(reachable) - 1
     log_z = np.full(reachable.shape, -np.inf)
     log_z[last, goal[reachable[last, goal]]] = 0.0
-    blocks = max(1, min(regions, -(-regions * 2 * 8 * states // ALPHA_BYTES)))
-    alpha = np.empty(regions)
-    for first, end in pairwise(np.linspace(0, regions, blocks + 1).astype(int).tolist()):
+    count = regions - skip
+    blocks = max(1, min(count, -(-count * 2 * 8 * states // ALPHA_BYTES)))
+    alpha = np.empty(count)
+    for first, end in pairwise(np.linspace(skip, regions, blocks + 1).astype(int).tolist()):
         levels = np.empty((2, states, end - first))  # alpha_t is levels[t % 2]
         levels[last % 2, goal] = 1.0
         for moves, early, late in reversed(legs):
             arrays = moves.begins, moves.successor, moves.log_weight
             crossings = moves.crossing_begins, moves.crossing_region
             _step_back(*arrays, *crossings, reachable, early, late, log_z, first, levels)
-        alpha[first:end] = levels[0, start]
+        alpha[first - skip : end - skip] = levels[0, start]
     return log_z, np.minimum(alpha, 1.0)
 
 

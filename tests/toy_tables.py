@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 
@@ -60,3 +61,22 @@ def random_table(
     }
     reward = -cost * rng.uniform(0.5, 1.5, size=successor.shape)
     return Table.from_arrays(successor, reward, 0, states - 1, named)
+
+
+def trajectories(table: Table, steps: int) -> list[tuple[float, list[int], list[int]]]:
+    """Weight, states and rows of moves of every trajectory from 0, up to the goal at the latest."""
+    everything = []
+    goals = set(table.goals.tolist())
+    for length in range(1, steps + 1):
+        for actions in product(range(table.actions), repeat=length):
+            states, rows, reward = [0], [], 0.0
+            for action in actions:
+                if not table.allowed[states[-1], action]:
+                    break
+                reward += table.reward[states[-1], action]
+                rows.append(states[-1] * table.actions + action)
+                states.append(int(table.successor[states[-1], action]))
+            whole = len(rows) == length and (states[-1] in goals or not goals)
+            if whole and (goals or length == steps):
+                everything.append((float(np.exp(reward)), states, rows))
+    return everything

@@ -2,35 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import pytest
-from toy_tables import published_grid, random_table
+from toy_tables import published_grid, random_table, trajectories
 
 from mlci.causal_entropy import CausalEntropy
 from mlci.first_exit import FirstExit
 from mlci.fixed_horizon import FixedHorizon
 from mlci.tables import Table
-
-
-def trajectories(table: Table, steps: int) -> list[tuple[float, list[int], list[int]]]:
-    """Weight, states and rows of moves of every trajectory from 0, up to the goal at the latest."""
-    everything = []
-    goals = set(table.goals.tolist())
-    for length in range(1, steps + 1):
-        for actions in product(range(table.actions), repeat=length):
-            states, rows, reward = [0], [], 0.0
-            for action in actions:
-                if not table.allowed[states[-1], action]:
-                    break
-                reward += table.reward[states[-1], action]
-                rows.append(states[-1] * table.actions + action)
-                states.append(int(table.successor[states[-1], action]))
-            whole = len(rows) == length and (states[-1] in goals or not goals)
-            if whole and (goals or length == steps):
-                everything.append((float(np.exp(reward)), states, rows))
-    return everything
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 5])
@@ -71,10 +50,10 @@ def test_without_goals_it_is_the_causal_policy_of_certain_moves() -> None:
     some = random_table(np.random.default_rng(3), states=6, actions=3)
     successor = np.where(some.successor < 0, 0, some.successor)
     table = Table.from_arrays(successor, some.reward, np.full(6, 1 / 6))
-    trajectories, agent = FixedHorizon(table, steps=8), CausalEntropy(table, steps=8)
-    np.testing.assert_allclose(trajectories.log_z[:-1], agent.values, rtol=1e-12)
-    np.testing.assert_allclose(trajectories.policy(3), agent.policy(3), atol=1e-12)
-    np.testing.assert_allclose(trajectories.expected_visits, agent.expected_visits, atol=1e-12)
+    fixed, agent = FixedHorizon(table, steps=8), CausalEntropy(table, steps=8)
+    np.testing.assert_allclose(fixed.log_z[:-1], agent.values, rtol=1e-12)
+    np.testing.assert_allclose(fixed.policy(3), agent.policy(3), atol=1e-12)
+    np.testing.assert_allclose(fixed.expected_visits, agent.expected_visits, atol=1e-12)
 
 
 def test_what_has_no_trajectory_is_refused() -> None:
