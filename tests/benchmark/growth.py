@@ -14,12 +14,11 @@ import json
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from experiments.tracking.environment import peak_memory
 from mlci.demonstrations import Task
@@ -31,6 +30,7 @@ from mlci.regions import Regions
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import Pendulum, System, TelescopingPendulum
 from mlci.tabular import action_grid, discretize
+from tests.held_bytes import held_bytes
 
 DT, STEPS = 0.25, 20  # [s], and steps of a task unless they are what grows
 
@@ -83,6 +83,7 @@ class Size:
         hypotheses: cells of the first and the third dimension (the second of two).
         steps: T.
         tasks: how many tasks are prepared.
+        dt: time step [s].
     """
 
     system: str = "telescope"
@@ -91,6 +92,7 @@ class Size:
     hypotheses: tuple[int, int] = (10, 10)
     steps: int = STEPS
     tasks: int = 1
+    dt: float = DT
 
 
 TELESCOPES = (
@@ -116,7 +118,7 @@ FACTORS: dict[str, dict[int, Size]] = {
         for first, second in ((3, 1), (5, 3), (15, 5), (25, 15))
     },
     "steps": {steps: Size(steps=steps) for steps in (5, 20, 80, 320)},
-    "dimensions": {n: Size("torus", shape, (3, 3)) for n, shape in SPACES.items()},
+    "dimensions": {n: Size("torus", shape, (3, 3), dt=0.5) for n, shape in SPACES.items()},
 }
 
 
@@ -153,7 +155,7 @@ def infer_many(model: Any, size: Size) -> tuple[list[float], int, int]:
     """The same of many tasks between random states, of which log Z and Phi are one time."""
     rng, bounds = np.random.default_rng(0), Box(np.array([0.0, -2.0]), np.array([2 * np.pi, 2.0]))
     ends = rng.uniform(bounds.lower, bounds.upper, (size.tasks, 2, 2))
-    tasks = [Task(first, Box.point(last), size.steps * DT) for first, last in ends]
+    tasks = [Task(first, Box.point(last), size.steps * size.dt) for first, last in ends]
     clock = [time.process_time()]
     prepared = prepare(model, tasks)
     clock.append(time.process_time())
@@ -185,7 +187,7 @@ def measure(factor: str, value: int) -> dict[str, object]:
     grid, actions = Grid(system.space, size.shape), action_grid(system, size.actions)
     warm_up()
     imported, begin = peak_memory(), time.process_time()
-    model = discretize(system, grid, actions, DT, hypotheses)
+    model = discretize(system, grid, actions, size.dt, hypotheses)
     discretised = time.process_time() - begin
     many: Callable[[], Any] = lambda: infer_many(model, size)  # noqa: E731
     seconds, active, most = many() if size.tasks > 1 else infer_one(model, size, start, goal)
@@ -201,7 +203,7 @@ def measure(factor: str, value: int) -> dict[str, object]:
         "hypotheses": len(hypotheses),
         "demonstrations": size.tasks,
         "steps": size.steps,
-        "dt": DT,
+        "dt": size.dt,
         "largest_active_share": round(most / grid.size, 4),
         "cells_active": active,
         "discretise_s": round(discretised, 5),
@@ -215,20 +217,6 @@ def measure(factor: str, value: int) -> dict[str, object]:
         "floor_mb": round(imported + kept / 1e6),
         **timing.machine(),
     }
-
-
-def held_bytes(what: Any) -> int:
-    """Bytes of all arrays that an object holds, those of its cached properties included."""
-    if isinstance(what, np.ndarray):
-        return what.nbytes
-    if sparse.issparse(what):
-        return int(what.data.nbytes + what.indices.nbytes + what.indptr.nbytes)
-    if isinstance(what, (tuple, list)):
-        return sum(held_bytes(each) for each in what)
-    if is_dataclass(what) and not isinstance(what, type):
-        parts = {field.name: getattr(what, field.name) for field in fields(what)} | vars(what)
-        return sum(held_bytes(part) for part in parts.values())
-    return 0
 
 
 if __name__ == "__main__":

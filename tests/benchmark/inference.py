@@ -175,7 +175,7 @@ def _difference(one: tuple[float, Floats], other: tuple[float, Floats]) -> float
 def tabular_contest(world: World) -> Contest:
     """Who forms the tabular model; judged by log Z and Phi of a task on it."""
     reward = _reward(world)
-    reference = plain.log_z_and_phi(world, plain.discretise(world))
+    reference = _theirs(world, *looped(world), reward)
     steps = world.grid.size * len(world.actions) * world.substeps
 
     def ours() -> Work:

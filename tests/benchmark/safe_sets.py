@@ -87,14 +87,14 @@ def _contest(
 
     rivals = [
         Contender(f"hj-reachability, {accuracy}", _hj(system, grid, keep_out, tau, accuracy))
-        for accuracy in ("low", "medium", "high", "very_high")
+        for accuracy in ("medium", "high", "very_high")
     ]
     plain = Contender("plain compiled loops", _loops(system, grid, keep_out, tau))
-    student = Contender("plain numpy, first order", _student(system, grid, keep_out, tau))
+    student = [Contender("plain numpy, first order", _student(system, grid, keep_out, tau))]
     return Contest(
         "safe set",
         f"{name}, {' x '.join(map(str, grid.shape))}",
-        [Contender(OURS, ours), *rivals, plain, student],
+        [Contender(OURS, ours), *rivals, plain, *(student if grid.size < 1e5 else [])],
         error,
         None,
         "wrong area / doomed area",
