@@ -38,7 +38,8 @@ class Selection:
         added: (K,) those added, in order.
         kl: (K+1,) divergence of the paths from the distribution: without constraints, and after
             each [nat].
-        next_decrease: by how much the best of the rest would lower it [nat]; 0 where none is left.
+        next_decrease: by how much the best of the rest would have lowered it, where nothing more
+            was added [nat]; 0 where none was left.
     """
 
     names: tuple[str, ...]
@@ -71,6 +72,7 @@ def select_constraints(
     *,
     most: int | None = None,
     steps: int | None = None,
+    prune: bool = False,
 ) -> Selection:
     """Add one hypothesis of a table after the other, as long as each explains enough.
 
@@ -81,6 +83,8 @@ def select_constraints(
         most: how many to add at most; by default as many as there are.
         steps: the horizon of `mlci.fixed_horizon`; None takes trajectories of any length, those of
             `mlci.first_exit`. A horizon is faster where there are many hypotheses.
+        prune: drop in the end those without which KL would rise by no more than `least`, given all
+            others: what was added early may be explained by what came later.
 
     Raises:
         ValueError: no paths, a path that does not run from a start to its first goal by moves of
@@ -105,6 +109,8 @@ def select_constraints(
         return np.array([now - mean_log_z(mask | one) for one in each])
 
     added, decrease, following = greedy(decreases, feasible, least, most)
+    if prune:
+        added, decrease = without_needless(decreases, added, len(feasible), least)
     kl = _divergence(table, paths) + mean_log_z(np.zeros(len(feasible), dtype=bool))
     return Selection(
         tuple(table.regions), added, kl - np.cumsum(np.append(0.0, decrease)), following
@@ -138,6 +144,35 @@ def greedy(
         added.append(int(candidates[best]))
         steps.append(float(decrease[best]))
     return np.array(added, dtype=np.int64), np.array(steps), 0.0
+
+
+def without_needless(
+    decreases: Callable[[Bools, Ints], Floats], added: Ints, hypotheses: int, least: float
+) -> tuple[Ints, Floats]:
+    """Drop one after the other of what was added, as long as it costs no more than `least`.
+
+    Args:
+        decreases: as of `greedy`.
+        added: (K,) numbers of hypotheses.
+        hypotheses: C.
+        least: the rise above which a hypothesis is kept.
+
+    Returns:
+        Those kept (K',) in their order, and the decrease (K',) that each brings after those before.
+    """
+
+    def decrease(others: list[int], candidate: int) -> float:
+        mask = np.isin(np.arange(hypotheses), others)
+        return float(decreases(mask, np.array([candidate]))[0])
+
+    kept = added.tolist()
+    while kept:
+        rises = [decrease([other for other in kept if other != i], i) for i in kept]
+        if min(rises) > least:
+            break
+        del kept[int(np.argmin(rises))]
+    steps = [decrease(kept[:k], kept[k]) for k in range(len(kept))]
+    return np.array(kept, dtype=np.int64), np.array(steps)
 
 
 def _starts(table: Table, paths: Sequence[TablePath], steps: int | None) -> Ints:

@@ -134,3 +134,31 @@ def test_a_path_beyond_the_horizon_is_refused(goals: list[int], steps: int) -> N
     table = Table.from_arrays(table.successor, -3.0, 0, goals, table.regions)
     with pytest.raises(ValueError, match=f"a path has 6 moves, the horizon {steps}"):
         select_constraints(table, paths, steps=steps)
+
+
+@pytest.mark.parametrize("steps", [None, 1])
+def test_pruning_drops_what_others_explain(steps: int | None) -> None:
+    """Five moves of weights 1, 1, 2, 2, 1 lead to the goal, and the path takes the first. The
+    heaviest pair of the others is added first, and needless beside the pairs that cover it."""
+    pairs = {"middle": [2, 3], "left": [1, 2], "right": [3, 4]}
+    regions = {name: TableRegion(actions=actions) for name, actions in pairs.items()}
+    reward = np.log([[1.0, 1.0, 2.0, 2.0, 1.0]])
+    table = Table.from_arrays([[1] * 5, [-1] * 5], reward, 0, 1, regions)
+    path = table.path(0, [0])
+    greedy = select_constraints(table, [path], steps=steps)
+    assert greedy.to_frame()["hypothesis"].tolist() == ["middle", "left", "right"]
+    np.testing.assert_allclose(greedy.kl, np.log([7, 3, 2, 1]), atol=1e-12)
+    pruned = select_constraints(table, [path], steps=steps, prune=True)
+    assert pruned.to_frame()["hypothesis"].tolist() == ["left", "right"]
+    np.testing.assert_allclose(pruned.kl, np.log([7, 4, 1]), atol=1e-12)
+
+
+def test_pruning_keeps_what_is_needed() -> None:
+    table, paths = small()
+    pruned = select_constraints(table, paths, least=0.02, prune=True)
+    assert len(pruned.added) > 0
+    full = divergence(table.under(pruned.mask), paths)
+    assert pruned.kl[-1] == pytest.approx(full, abs=1e-12)
+    for i in pruned.added:
+        rest = pruned.mask & (np.arange(len(pruned.mask)) != i)
+        assert divergence(table.under(rest), paths) > full + 0.02
