@@ -68,6 +68,11 @@ class FinishedPoint:
         names = list(row)
         return {name: row[name] for name in names[: names.index(LAST_OPENING) + 1]}
 
+    def columns(self, name: str) -> list[str]:
+        """Names of the columns of a table; errors as of `content`."""
+        head, _, _ = self.content(name).decode().partition("\n")
+        return next(csv.reader([head]))
+
     def table(self, name: str) -> pd.DataFrame:
         """A table of strings; errors as of `content`."""
         import pandas as pd

@@ -135,9 +135,10 @@ def resamples(sizes: Ints, key: Sequence[str]) -> Ints:
         share = rng.random((*seeds.shape, sizes.max()), dtype=np.float32)
         row = np.arange(len(seeds))[:, None, None] * first[-1] + first[seeds][..., None]
         row = row + (share * size).astype(np.intp)
-        # A seed with fewer rows than the largest takes as many of the draws as it has rows.
-        row = row[np.broadcast_to(np.arange(sizes.max()) < size, row.shape)]
-        total = np.bincount(row, minlength=len(seeds) * first[-1])
+        if sizes.min() < sizes.max():
+            # A seed with fewer rows than the largest takes as many of the draws as it has rows.
+            row = row[np.broadcast_to(np.arange(sizes.max()) < size, row.shape)]
+        total = np.bincount(row.ravel(), minlength=len(seeds) * first[-1])
         counts[begin : begin + at_once] = total.reshape(len(seeds), first[-1])
     return counts
 
@@ -188,7 +189,8 @@ def _mean_and_limits(values: Floats, counts: Ints) -> tuple[Floats, Floats, Floa
     weights = np.vstack([np.ones(len(values)), counts])  # as floats: BLAS does no integers
     there = ~np.isnan(values)
     with np.errstate(invalid="ignore"):  # a resample may have nothing of a column
-        means = weights @ np.where(there, values, 0.0) / (weights @ there.astype(float))
+        count = weights.sum(axis=1)[:, None] if there.all() else weights @ there.astype(float)
+        means = weights @ np.where(there, values, 0.0) / count
     low, high = _quantiles(means[1:], TAILS)
     return means[0], low, high
 
@@ -210,6 +212,8 @@ def _medians(values: Floats, counts: Ints) -> Floats:
 
 def _quantiles(values: Floats, shares: Sequence[float]) -> Floats:
     """(Q, M) quantiles of columns (N, M) over what is there; NaN of a column of NaN."""
+    if not np.isnan(values).any():  # numpy goes through the columns one by one otherwise
+        return np.asarray(np.quantile(values, shares, axis=0))
     with catch_warnings():
         simplefilter("ignore", RuntimeWarning)  # numpy's, of a column of NaN
         return np.asarray(np.nanquantile(values, shares, axis=0))

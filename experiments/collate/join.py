@@ -6,6 +6,8 @@ Beside them stand the tables that are made of these: intervals, reliability, exa
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -107,7 +109,7 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
     Raises:
         CollateError: a point lacks the table, or has other columns than the first.
     """
-    columns = list(points[0].table(name).columns)
+    columns = points[0].columns(name)
     opening = list(takewhile(points[0].opening.__contains__, columns))
     groups = [[point] for point in points]
     if len(opening) < len(points[0].opening):
@@ -116,21 +118,28 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
             by_content.setdefault(point.table_digest(name), []).append(point)
         groups = list(by_content.values())
     extra = _extra_columns(groups, opening)
-    header = csv_bytes(pd.DataFrame(columns=[*extra, *columns]))
-    yield header
+    yield csv_bytes(pd.DataFrame(columns=[*extra, *columns]))
     for point, *_ in groups:
-        content = point.content(name)
-        if content.startswith(header):  # the same columns: nothing stands beside its rows
-            yield content[len(header) :]
-            continue
-        table = point.table(name)
-        if list(table.columns) != columns:
+        if (own := point.columns(name)) != columns:
             raise CollateError(
-                f"the columns of {point.folder / name}.csv are {','.join(table.columns)}, "
+                f"the columns of {point.folder / name}.csv are {','.join(own)}, "
                 f"not {','.join(columns)}"
             )
-        front = {key: point.config.get(key, "") for key in extra}
-        yield csv_bytes(pd.DataFrame({**front, **table}, index=table.index), header=False)
+        yield _opened(point, name, {key: point.config.get(key, "") for key in extra})
+
+
+def _opened(point: FinishedPoint, name: str, front: Mapping[str, Any]) -> bytes:
+    """The rows of a point's table as it wrote them, each opened by some values."""
+    _, _, rows = point.content(name).partition(b"\n")
+    if not front:
+        return rows
+    if b'"' in rows:  # a row may have several lines
+        table = point.table(name)
+        return csv_bytes(pd.DataFrame({**front, **table}, index=table.index), header=False)
+    text = io.StringIO()
+    csv.writer(text, lineterminator="").writerow([*front.values(), ""])  # ends with a comma
+    opening = text.getvalue().encode()
+    return b"".join(opening + row for row in rows.splitlines(keepends=True))
 
 
 def _made_tables(

@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 from hand_made import alter, hand_made
 
-from experiments.collate.finished import CollateError
-from experiments.collate.join import collate
+from experiments.collate.finished import CollateError, FinishedPoint
+from experiments.collate.join import _opened, collate
 from experiments.tracking.files import digest
 from experiments.tracking.points import Point
 from experiments.tracking.sealed import read_sealed
@@ -306,3 +306,29 @@ def test_a_study_is_read_without_the_times_of_its_points(tmp_path: Path) -> None
     collated_again(tmp_path / "study", tmp_path, 1.0, started="2027")
     (tmp_path / "study" / "runs.json").write_text("{")
     assert study_of(tmp_path / "study").collated.started == ("", "")
+
+
+@pytest.mark.parametrize(
+    "front",
+    [
+        {"a": True, "b": 1, "c": 1.0, "d": 1e-05, "e": "words, and more", "f": None},
+        {"a": None},
+        {"a": '[1,"two"]', "b": 0.1 + 0.2},
+    ],
+)
+@pytest.mark.parametrize("name", ["plain", "quoted", "empty"])
+def test_values_before_a_row_are_spelt_as_pandas_spells_them(
+    front: dict[str, Any], name: str, tmp_path: Path
+) -> None:
+    tables = {
+        "plain": pd.DataFrame({"x": [0.1, np.nan], "y": ["one", "two words"]}),
+        "quoted": pd.DataFrame({"x": ['says "so"', "two\nlines"], "y": ["a,b", "c"]}),
+        "empty": pd.DataFrame({"x": [], "y": []}),
+    }
+    content = tables[name].to_csv(index=False, lineterminator="\n").encode()
+    (tmp_path / f"{name}.csv").write_bytes(content)
+    point = FinishedPoint("", tmp_path, {"files": {f"{name}.csv": digest(content)}})
+    table = point.table(name)
+    expected = pd.DataFrame({**front, **table}, index=table.index)
+    text = expected.to_csv(index=False, header=False, lineterminator="\n")
+    assert _opened(point, name, front) == text.encode()
