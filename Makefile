@@ -65,8 +65,9 @@ lint: $(READY) ## check style, formatting and types
 	$(BIN)/ruff format --check
 	$(BIN)/mypy mlci experiments
 
+# SCALE=6d runs one task in six dimensions instead, which takes hours.
 benchmark: $(READY) ## time the project against other packages and floors
-	$(BIN)/python -m tests.benchmark
+	$(BIN)/python -m tests.benchmark$(if $(SCALE),.$(SCALE:6d=six_dimensions))
 
 # All extras but the benchmark's peers, which weigh gigabytes.
 LOCKED := parquet excel mocap slurm dask dev

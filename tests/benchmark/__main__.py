@@ -21,6 +21,7 @@ import json
 import subprocess
 import sys
 import tempfile
+import textwrap
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
@@ -44,7 +45,7 @@ def main() -> int:
     arguments = parser.parse_args()
     folder, begin = arguments.results / "benchmark", time.time()
     machine = timing.machine()
-    print(", ".join(f"{key} {value}" for key, value in machine.items()), end="\n\n")
+    print(textwrap.fill(", ".join(f"{key} {value}" for key, value in machine.items()), 80) + "\n")
     rows: dict[str, list[Any]] = {name: [] for name in TABLES}
     for part in arguments.parts or PARTS:
         PARTS[part](rows)
@@ -154,7 +155,8 @@ def _show_times(rows: list[timing.Row]) -> None:
     """Print times, and what the paper says of them."""
     for row in rows:
         said = f" (paper: {row.paper})" if row.paper else ""
-        print(f"{contest.in_units(row.median_s):>10}  {row.what}{said}")
+        line = f"{contest.in_units(row.median_s):>10}  {row.what}{said}"
+        print(textwrap.fill(line, 80, subsequent_indent=" " * 12))
 
 
 if __name__ == "__main__":

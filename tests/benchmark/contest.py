@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -135,8 +136,9 @@ def show(rows: Sequence[dict[str, Any]]) -> str:
     """The rows of a contest in 80 columns."""
     first = rows[0]
     lines = [
-        f"{first['part']}: {first['problem']}",
-        f"  {'':<36}{'median':>10}{'spread':>8}{'x mlci':>9}  {first['measure'][:14]}",
+        *textwrap.wrap(f"{first['part']}: {first['problem']}", 80, subsequent_indent="  "),
+        f"  error: {first['measure']}",
+        f"  {'':<36}{'median':>10}{'spread':>8}{'x mlci':>9}  {'error':>8}",
     ]
     for row in rows:
         if row["state"] != "measured":
@@ -146,7 +148,7 @@ def show(rows: Sequence[dict[str, Any]]) -> str:
         error = "" if row["who"].startswith("floor") else f"{row['error']:.2g}"
         lines.append(
             f"  {row['who'][:36]:<36}{in_units(row['median_s']):>10}{spread:>8}"
-            f"{row['ratio']:>9.3g}  {error}"
+            f"{row['ratio']:>9.3g}  {error:>8}"
         )
     return "\n".join(lines) + "\n"
 

@@ -6,6 +6,7 @@ the policy without logarithms, quantecon the maximum in place of the log of a su
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
@@ -351,7 +352,9 @@ def quantecon(world: World, table: Table) -> Contender:
         chances = sparse.csr_matrix((np.ones(count), columns, np.arange(count + 1)))
         state = np.append(np.repeat(np.arange(cells), moves), cells)
         action = np.append(np.tile(np.arange(moves), cells), 0)
-        problem = DiscreteDP(rewards, chances, 1.0, state, action)
+        with warnings.catch_warnings():  # no discount: for a finite horizon it needs none
+            warnings.simplefilter("ignore")
+            problem = DiscreteDP(rewards, chances, 1.0, state, action)
         last = np.zeros(cells + 1)
         last[-1] = _LOST
         return lambda: backward_induction(problem, world.steps, last)[0]
