@@ -24,7 +24,8 @@ from experiments.config.read import read_recorded_config, writable_results
 from experiments.config.settings import ESTIMATE, RecordedSettings
 from experiments.console import answer_lines, diagnosis_lines
 from experiments.page.document import page
-from experiments.point.forecasts import recorded_calibration
+from experiments.lookback.recordings import CALIBRATION
+from experiments.point.forecasts import exported_calibration, recorded_calibration
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import plausibilities, read_recordings, together
 from experiments.point.recorded_tables import demonstration_tables, path_table
@@ -51,6 +52,12 @@ ON_WRONG_MODELS = (
     "are right where that is so"
 )
 
+_EXPORTED = "evidence is calibrated by the tasks of the point that these demonstrations come from"
+_NOT_EXPORTED = (
+    "is not used, since it fits another model, other hypotheses, another kind of evidence or other "
+    "source; evidence is calibrated by tasks like the recorded ones"
+)
+
 
 def main() -> int:
     """Run the command line.
@@ -69,6 +76,7 @@ def infer(settings: RecordedSettings) -> int:
     begin("reading files")
     readings = read_recordings(settings)
     demonstrations, problems, notes = readings
+    calibration = _exported_calibration(settings, notes) if settings.inference.calibrate else None
     begin("")
     for problem in problems:
         complain(f"not used: {problem}")
@@ -83,8 +91,7 @@ def infer(settings: RecordedSettings) -> int:
     say(_doubt_lines(checks))
     begin("forming the tabular model")
     model = _tabular_model(settings)
-    calibration = None
-    if settings.inference.calibrate:
+    if settings.inference.calibrate and calibration is None:
         store = Store(results / "store")
         calibration = recorded_calibration(settings, model, demonstrations, store)
     result = _answer(settings, model, demonstrations, calibration, summary(checks))
@@ -108,6 +115,18 @@ def infer(settings: RecordedSettings) -> int:
     ):
         print(line)
     return FAILED if problems else DONE
+
+
+def _exported_calibration(settings: RecordedSettings, notes: list[Remark]) -> Calibration | None:
+    """The calibration that comes with a point's exported demonstrations, if these are ranked."""
+    given = settings.demonstrations
+    paths = [given] if isinstance(given, str) else given
+    folder = Path(paths[0]).expanduser() / CALIBRATION
+    if len(paths) > 1 or not folder.is_dir():
+        return None
+    calibration = exported_calibration(settings, Store(folder))
+    notes.append(Remark(shown_path(folder), _NOT_EXPORTED if calibration is None else _EXPORTED))
+    return calibration
 
 
 def _answer(
@@ -206,11 +225,12 @@ def _save(
     """Write tables, map and record into a folder of their own, named by what went in."""
     space, inference = settings.model.space, result.inference
     paths = path_table(demonstrations, space.names)
-    # What decides the result: the settings that do, and the numbers that were read.
+    # What decides the result: the settings that do, and the numbers that were read or simulated.
     made_from = {
         "config": {**plain(settings), "demonstrations": "", "results": None, "top": 0},
         "paths": digest(csv_bytes(paths)),
         "times": digest(b"".join(each.times.tobytes() for each in demonstrations)),
+        "forecasts": plain(inference.calibration),
     }
     results = results_folder(settings) / "inference"
     folder = results / digest(canonical_json(made_from))[:16]

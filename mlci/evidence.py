@@ -178,37 +178,38 @@ def rank_constraints(
     rank = rank_scores(gain, gain > -np.inf)
     each, none = posterior(gain, prior_none, prior)
     feasible = ~np.any(np.asarray(violated, dtype=bool), axis=0)
-    return Ranking(gain, feasible, rank, np.argsort(rank, kind="stable"), each, none)
+    return Ranking(gain, feasible, rank, np.argsort(rank, kind="stable"), each, float(none))
 
 
 def posterior(
     gain: ArrayLike, prior_none: float = 0.5, prior: ArrayLike | None = None
-) -> tuple[Floats, float]:
+) -> tuple[Floats, Floats]:
     """Exact posterior under "at most one constraint", replacing (12) where MLCI chose among C.
 
     P(C_i | D) = pi_i e^(L_i) / (pi_0 + sum_k pi_k e^(L_k)), and e^(-inf) = 0 for the infeasible.
     An infinite gain takes all the probability; several share it by their priors.
 
     Args:
-        gain: (C,) L_i, -inf where infeasible.
+        gain: (..., C) L_i, -inf where infeasible.
         prior_none: pi_0, in (0, 1].
         prior: (C,) weights of the hypotheses, scaled to add up to 1 - pi_0; equal by default.
 
     Returns:
-        (C,) P(C_i | D), and P(no constraint | D).
+        (..., C) P(C_i | D), and (...,) P(no constraint | D).
 
     Raises:
         ValueError: a prior outside its range.
     """
     gain = np.asarray(gain, dtype=float)
-    share = prior_shares(len(gain), prior_none, prior)
+    share = prior_shares(gain.shape[-1], prior_none, prior)
     certain = (gain == np.inf) & (share > 0)
-    if np.any(certain):
-        return np.where(certain, share, 0.0) / np.sum(share[certain]), 0.0
+    decided = np.any(certain, axis=-1, keepdims=True)
+    gain = np.where(decided, np.where(certain, 0.0, -np.inf), gain)
     with np.errstate(divide="ignore"):
-        log_weight = np.append(np.log(share) + gain, np.log(prior_none))
-    probability = np.exp(log_weight - logsumexp(log_weight))
-    return probability[:-1], float(probability[-1])
+        none = np.where(decided, -np.inf, np.log(prior_none))
+        log_weight = np.concatenate([np.log(share) + gain, none], axis=-1)
+    probability = np.exp(log_weight - logsumexp(log_weight, axis=-1, keepdims=True))
+    return probability[..., :-1], probability[..., -1]
 
 
 def prior_shares(count: int, prior_none: float, prior: ArrayLike | None = None) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import comb
 
-from mlci.evidence import log_marginal, rank_scores
+from mlci.evidence import posterior, rank_scores
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 
 
@@ -114,8 +114,4 @@ def claims(gains: Floats, prior_none: float) -> Floats:
         gains: (B, C) as for `truth_ranks`.
         prior_none: prior probability that there is no constraint.
     """
-    certain = np.sum(gains == np.inf, axis=1)  # these share everything
-    finite = np.where(gains == np.inf, 0.0, gains)
-    share = (1 - prior_none) / gains.shape[1]
-    best = share * np.exp(np.max(finite, axis=1) - log_marginal(finite, prior_none))
-    return np.where(certain > 0, 1 / np.maximum(certain, 1), best)
+    return np.asarray(np.max(posterior(gains, prior_none)[0], axis=1))

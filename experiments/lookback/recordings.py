@@ -16,8 +16,14 @@ from mlci.recordings.write import write_demonstration
 from mlci.spaces import Box, StateSpace
 
 
+CALIBRATION = "calibration"  # the folder that holds a point's calibration, beside its recordings
+
+
 def write_recordings(facts: Facts, folder: Path) -> list[Path]:
     """Write a CSV of each demonstration of a finished point, with its goal; no number is rounded.
+
+    If the point's evidence is calibrated, its calibration is written as well: it rests on tasks
+    from where the point's tasks come from, which the recordings do not tell.
 
     Args:
         facts: the point.
@@ -27,14 +33,14 @@ def write_recordings(facts: Facts, folder: Path) -> list[Path]:
         The files.
 
     Raises:
-        ArchiveError: the point has not finished, its stored demonstrations were removed, or the
-            folder holds something; or what is stored is not as a point writes it.
+        ArchiveError: the point has not finished, its stored demonstrations or its calibration were
+            removed, or the folder holds something; or what is stored is not as a point writes it.
     """
     identity = facts.point.identity
     if not facts.record:
         raise ArchiveError(f"{identity}: has not finished; run it first")
-    store = Store(facts.point.results / "store")
-    trials = store.read("demonstrations", facts.record["stages"].get("demonstrations", ""))
+    store, stages = Store(facts.point.results / "store"), facts.record["stages"]
+    trials = store.read("demonstrations", stages.get("demonstrations", ""))
     if trials is None:
         raise ArchiveError(f"{identity}: its stored demonstrations are gone; run it again")
     if folder.exists() and any(folder.iterdir()):
@@ -45,6 +51,9 @@ def write_recordings(facts: Facts, folder: Path) -> list[Path]:
         raise ArchiveError(
             f"{identity}: its demonstrations are not as points write them: {error}"
         ) from None
+    forecasts = stages.get("forecasts")
+    if forecasts and not store.copy("forecasts", forecasts, Store(folder / CALIBRATION)):
+        raise ArchiveError(f"{identity}: its stored calibration is gone; run it again")
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / f"trial_{number:03d}.csv" for number in demonstrations]
     for path, demonstration in zip(files, demonstrations.values(), strict=True):

@@ -24,7 +24,7 @@ from mlci.evidence import confidence, printed_confidence
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.simulate import step_count
-from mlci.spaces import Bools, Floats
+from mlci.spaces import Bools, Floats, Ints
 from mlci.tabular import TabularModel
 
 # Probabilities are counted between these; most hypotheses are unlikely, so the first are narrow.
@@ -95,11 +95,16 @@ def _beliefs(inference: Inference, truth: Bools) -> Iterator[tuple[str, Floats, 
     yield "printed", np.array([printed_confidence(prior, avoidance)]), right
 
 
-def _binned(probability: Floats, right: Bools) -> Iterator[dict[str, float]]:
-    """Counts of each bin that holds something; 0 is below 0, and one more than the last above 1."""
+def bins_of(probability: Floats) -> Ints:
+    """(B,) numbers of the bins of probabilities; 0 is below 0, one more than the last above 1."""
     rounded = np.round(probability, _DECIMALS)
     place = np.searchsorted(EDGES, rounded, side="right")
-    place = np.where(rounded == EDGES[-1], len(EDGES) - 1, place)
+    return np.where(rounded == EDGES[-1], len(EDGES) - 1, place)
+
+
+def _binned(probability: Floats, right: Bools) -> Iterator[dict[str, float]]:
+    """Counts of each bin that holds something."""
+    place = bins_of(probability)
     for number in np.unique(place):
         inside = place == number
         yield {

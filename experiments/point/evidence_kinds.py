@@ -1,33 +1,43 @@
 """The same demonstrations of one world read with different kinds of evidence.
 
 Whether probabilities come true, and how probable the truth becomes, says which kind to trust.
+
+A score is the mean over all sets of so many of the world's demonstrations, of which random ones are
+taken. Any set has the same expected score, so that the mean estimates the same as over disjoint
+sets, but more precisely: a U-statistic. Sets that share demonstrations resemble each other, and so
+intervals are over worlds (`experiments.collate.evidence_kinds`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
+from experiments.point.belief_counts import bins_of
 from experiments.point.inference import PointInference
+from experiments.point.streams import Purpose, stream
 from mlci.calibration import Calibration
-from mlci.evidence import PAPER, Rates
+from mlci.evidence import PAPER, Rates, posterior, rank_scores, total_gain
 from mlci.inference import Inference
+from mlci.metrics import random_subsets
 from mlci.preparation import infer
+from mlci.spaces import Ints
 
 FIXED_RATES = (0.05, 0.1, 0.2)
-COLUMNS = ["prior", "sets", "set", "demonstrations", "evidence", "best", "right", "of_truth", "top"]
-COLUMNS += ["feasible"]
+SETS = 100  # of each size
+LEAST = 1e-10  # a posterior below counts as this, where its logarithm is averaged
+COLUMNS = ["prior", "sets", "demonstrations", "evidence", "bin", "count", "best", "right"]
+COLUMNS += ["log_truth", "top"]
 
 
 def evidence_table(
     settings: Settings, point: PointInference, calibration: Calibration
 ) -> pd.DataFrame:
-    """A row a set, number of demonstrations and kind of evidence.
-
-    Sets of one size share no demonstration, and there are as many of them as there can be.
+    """A row a number of demonstrations, kind of evidence and bin of the best hypothesis' posterior.
 
     Args:
         settings: the point; its truth is one hypothesis, or nothing.
@@ -35,47 +45,53 @@ def evidence_table(
         calibration: of the forecasts with exact ends.
 
     Returns:
-        `prior` of the world, its number of `sets` of that size; `set`, `demonstrations`,
-        `evidence`; `best`, the posterior of the most likely hypothesis, and whether it is `right`;
-        `of_truth`, the posterior of what is true; whether the truth is in the `top`, nothing where
-        nothing is forbidden; how many hypotheses are still `feasible`.
+        `prior` of the world, how many `sets` of each size; `demonstrations`, `evidence`, `bin`; of
+        the sets in that bin their `count`, and the sums of: `best`, the posterior of the most
+        likely hypothesis; whether it is `right`; `log_truth`, the log posterior of what is true,
+        LEAST at least; whether the truth is in the `top`, nothing where nothing is forbidden.
     """
-    kinds, cell = _kinds(settings, point, calibration), settings.truth.cell
+    cell, sizes = settings.truth.cell, settings.calibration.demonstrations
     hypotheses, prior_none = len(point.inference.hypotheses), point.inference.prior_none
     prior = prior_none if cell is None else (1 - prior_none) / hypotheses
-    rows = []
-    for count in settings.calibration.demonstrations:
-        sets = len(point.inference.names) // count
-        for number, first in enumerate(range(0, sets * count, count)):
-            for kind, inference in kinds.items():
-                ranking = inference.of(slice(first, first + count)).ranking
-                best = int(ranking.order[0])
-                rows.append(
-                    {
-                        "prior": prior,
-                        "sets": sets,
-                        "set": number,
-                        "demonstrations": count,
-                        "evidence": kind,
-                        "best": ranking.posterior[best],
-                        "right": int(best == cell),
-                        "of_truth": ranking.posterior_none
-                        if cell is None
-                        else ranking.posterior[cell],
-                        "top": np.nan
-                        if cell is None
-                        else int(ranking.rank[cell] <= settings.ranks.top),
-                        "feasible": int(np.sum(ranking.feasible)),
-                    }
-                )
+    rng = stream(settings.seed, Purpose.EVIDENCE, 0 if cell is None else cell + 1)
+    subsets = random_subsets(len(point.inference.names), max(sizes), SETS, rng)
+    kinds, rows = _kinds(settings, point, calibration), []
+    for size in sizes:
+        for kind, inference in kinds.items() if size <= len(subsets) else ():
+            opening = {"prior": prior, "sets": SETS, "demonstrations": size, "evidence": kind}
+            for counted in _binned(inference, subsets[size - 1], cell, settings.ranks.top):
+                rows.append({**opening, **counted})
     return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _binned(
+    inference: Inference, subsets: Ints, cell: int | None, top: int
+) -> Iterator[dict[str, float]]:
+    """What subsets (B, k) of demonstrations say of a truth, summed over each bin."""
+    gains = total_gain(inference.evidence[subsets])
+    rank = rank_scores(gains, gains > -np.inf)
+    each, none = posterior(gains, inference.prior_none)
+    first = np.argmin(rank, axis=1)  # of those that tie, the first by number
+    best = np.take_along_axis(each, first[:, None], axis=1)[:, 0]
+    of_truth = none if cell is None else each[:, cell]
+    values = {
+        "best": best,
+        "right": first == (-1 if cell is None else cell),
+        "log_truth": np.log(np.maximum(of_truth, LEAST)),
+        "top": np.full(len(best), np.nan) if cell is None else rank[:, cell] <= top,
+    }
+    place = bins_of(best)
+    for number in np.unique(place):
+        inside = place == number
+        sums = {name: float(np.sum(value[inside])) for name, value in values.items()}
+        yield {"bin": int(number), "count": int(np.sum(inside)), **sums}
 
 
 def _kinds(
     settings: Settings, point: PointInference, calibration: Calibration
 ) -> dict[str, Inference]:
     """The inference of all demonstrations with each kind of evidence."""
-    exact = replace(point.inference, rates=PAPER, calibration=None)
+    exact = replace(point.inference, rates=PAPER, calibration=None, rule_breaking=None)
     kinds = {
         "paper": infer(
             point.model,

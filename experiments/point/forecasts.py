@@ -10,6 +10,7 @@ import dataclasses
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,13 @@ import pandas as pd
 
 import mlci.calibration
 import mlci.demonstrator
-from experiments.config.settings import RecordedSettings, Settings
+from experiments.config.settings import ModelSettings, RecordedSettings, Settings
 from experiments.point.stages import model_inputs, system_module, tabular_model
 from experiments.point.trials import nominal_skill
 from experiments.progress import begin
+from experiments.tracking.sources import source_hash
 from experiments.tracking.store import Store
+from experiments.tracking.trees import canonical_json
 from mlci.calibration import Calibration, calibrate, calibrate_on
 from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
@@ -73,13 +76,34 @@ def forecast_calibration(settings: Settings, store: Store) -> Calibration:
         )
         return _arrays(calibration)
 
-    modules = [
-        mlci.calibration,
-        mlci.demonstrator,
-        system_module(settings.model),
-        sys.modules[__name__],
-    ]
+    modules = _modules(settings)
     return _calibration(store.get("forecasts", forecast_inputs(settings), modules, compute))
+
+
+def _modules(settings: ModelSettings) -> list[ModuleType]:
+    """The modules that `forecast_calibration` depends on."""
+    here = sys.modules[__name__]
+    return [mlci.calibration, mlci.demonstrator, system_module(settings.model), here]
+
+
+def exported_calibration(settings: RecordedSettings, exported: Store) -> Calibration | None:
+    """The calibration that a point's demonstrations were exported with, if it fits the settings.
+
+    It fits if the tabular model, the hypotheses and the kind of ends are the point's, if every
+    touch counts as crossing, as it does in points, and if the source is that of now.
+    """
+    model, ends = model_inputs(settings, settings.candidates), settings.inference.exact_ends
+    inputs = canonical_json([model, ends])
+    source = source_hash([module.__name__ for module in _modules(settings)])
+    for made_from, arrays in exported.entries("forecasts"):
+        try:
+            depends = made_from["depends"]
+            same = canonical_json([depends[0], depends[-1]]) == inputs
+            if same and made_from["source"] == source and settings.crossing.crossing().is_any:
+                return _calibration(arrays)
+        except (LookupError, TypeError, ValueError):  # somebody else made it
+            continue
+    return None
 
 
 def recorded_calibration(

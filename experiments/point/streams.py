@@ -19,6 +19,7 @@ class Purpose(IntEnum):
     MODEL_DEMONSTRATIONS = 2
     RULE_BREAKING = 3
     SENSOR_NOISE = 4
+    EVIDENCE = 5
 
 
 def stream(seed: int, purpose: Purpose, *index: int) -> np.random.Generator:

@@ -95,6 +95,26 @@ class Store:
         arrays = _read_entry(folder, key)
         return None if arrays is None else Stored(key, arrays)
 
+    def entries(self, stage: str) -> Iterator[tuple[dict[str, Any], Stored]]:
+        """Every whole entry of a stage: what its key was made from, and its arrays."""
+        try:
+            folder = inner_path(self.folder.parent, self.folder.name, stage)
+        except OSError:
+            return
+        for note in sorted(folder.glob("*.json")):
+            arrays = _read_entry(folder, note.stem)
+            if arrays is not None:
+                yield read_sealed(note), Stored(note.stem, arrays)
+
+    def copy(self, stage: str, key: str, other: Store) -> bool:
+        """Copy an entry into another store; False if there is none that is whole."""
+        if self.read(stage, key) is None:
+            return False
+        for name in (f"{key}.npz", f"{key}.json"):
+            data = read_file(self.folder / stage / name)
+            replace_file(other.folder / stage / name, data)
+        return True
+
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
         """Count the time of a block for a stage of the point's record."""

@@ -30,6 +30,7 @@ from experiments.tracking.figure_notes import figure_note, write_note
 from experiments.tracking.points import Point
 from experiments.tracking.sealed import read_sealed
 from experiments.tracking.study import write_plan
+from experiments.tracking.tables import rounded
 
 TABLES = (
     "attempts, dimensions, first, hypotheses, moves, paths, probabilities, ranks, regions, "
@@ -413,28 +414,33 @@ def test_status_tells_why_not(
             assert told in line
 
 
-@pytest.mark.parametrize("inference", ["calibrated", "paper"])
+@pytest.mark.parametrize("words", [[], ["inference.calibrate=false"], ["inference=paper"]])
 def test_infer_on_a_points_recorded_files_gives_its_ranking_back(
-    tmp_path: Path, look, inference: str
+    tmp_path: Path, look, words: list[str]
 ) -> None:
     """With goals that are ranges, which the ends of the paths do not tell."""
-    words = (f"inference={inference}", "inference.calibrate=false", "tasks.goal=[0.6,null]")
-    point = computed(read_config(composed(*TINY, *words))[0], tmp_path)
+    of_point = [word for word in TINY if not word.startswith("inference")]
+    goal = "tasks.goal=[0.6,null]"
+    point = computed(read_config(composed(*of_point, goal, *words))[0], tmp_path)
     folder = tmp_path / "recorded"
     status, out, _ = look("demonstrations", point.identity[:8], "--out", str(folder))
     assert status == 0
     trials = pd.read_csv(point.folder / "trials.csv")["trial"]
     assert f"{len(trials)} demonstrations into {folder}" in out
-    assert sorted(path.stem for path in folder.iterdir()) == [f"trial_{i:03d}" for i in trials]
+    expected = [f"trial_{i:03d}" for i in trials]
+    assert sorted(path.stem for path in folder.iterdir() if path.is_file()) == expected
+    assert (folder / "calibration").exists() == (not words)
     model = ["system=double_integrator", "dt=0.5", "actions=3", "grid.shape=[12,8]"]
     done = run_here(
-        infer.main, f"demonstrations={folder}", f"results={tmp_path}", *model, *words[:2],
+        infer.main, f"demonstrations={folder}", f"results={tmp_path / 'else'}", *model, *words,
         folder=tmp_path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    (written,) = (tmp_path / "inference").iterdir()
+    assert ("calibrated by the tasks of the point" in done.stderr) == (not words)
+    (written,) = (tmp_path / "else" / "inference").iterdir()
     ranking, expected = (pd.read_csv(each / "hypotheses.csv") for each in (written, point.folder))
-    pd.testing.assert_frame_equal(ranking, expected[ranking.columns], rtol=1e-9)
+    # To the last digit that a point writes.
+    pd.testing.assert_frame_equal(rounded(ranking), expected[ranking.columns], check_exact=True)
     assert ranking["gain"].max() > 0.1
 
 
@@ -478,10 +484,16 @@ def test_demonstrations_that_are_not_there_are_told(
         status, _, err = look("demonstrations", name, "--out", out)
         assert status == 2
         assert message in err
-    shutil.rmtree(tmp_path / "store" / "demonstrations")
-    status, _, err = look("demonstrations", point.identity, "--out", folder)
-    assert status == 2
-    assert "its stored demonstrations are gone; run it again" in err
+    calibrated = ["inference.calibrate=true", "demonstrations.goal_tolerance=1.0"]
+    other = computed(read_config(composed(*TINY, *calibrated))[0], tmp_path)
+    for stage, identity, what in (
+        ("forecasts", other.identity, "calibration is"),
+        ("demonstrations", point.identity, "demonstrations are"),
+    ):
+        shutil.rmtree(tmp_path / "store" / stage)
+        status, _, err = look("demonstrations", identity, "--out", folder)
+        assert status == 2
+        assert f"its stored {what} gone; run it again" in err
     (point.folder / "record.json").unlink()
     status, _, err = look("demonstrations", point.identity, "--out", folder)
     assert "has not finished" in err

@@ -91,8 +91,19 @@ def test_posterior_is_calibrated_over_simulated_truths() -> None:
 
 def test_an_infinite_gain_takes_all_probability() -> None:
     chance, none = posterior(np.array([np.inf, 3.0, np.inf, -np.inf]), prior=[1, 1, 3, 1])
-    assert chance.tolist() == [0.25, 0.0, 0.75, 0.0]
+    assert chance == pytest.approx(np.array([0.25, 0.0, 0.75, 0.0]), abs=0, rel=1e-15)
     assert none == 0.0
+
+
+def test_posteriors_of_many_gains_are_those_of_each() -> None:
+    gains = np.array([[[0.3, -np.inf, 2.0], [np.inf, 1.0, np.inf]], [[0, 0, 0], [-1, -2, -3.0]]])
+    chances, none = posterior(gains, 0.3, prior=[1, 2, 1])
+    for place in np.ndindex(2, 2):
+        each, of_none = posterior(gains[place], 0.3, prior=[1, 2, 1])
+        assert chances[place].tolist() == each.tolist()
+        assert none[place] == of_none
+    odds = np.array([0.175 * np.exp(0.3), 0, 0.175 * np.exp(2.0), 0.3])
+    assert [*chances[0, 0], none[0, 0]] == pytest.approx((odds / odds.sum()).tolist(), rel=1e-14)
 
 
 def test_confidence_of_a_hypothesis_fixed_in_advance() -> None:

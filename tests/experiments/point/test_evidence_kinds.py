@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -12,11 +13,14 @@ from tiny_point import TINY, composed
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
 from experiments.point import evidence_kinds
-from experiments.point.evidence_kinds import evidence_table
+from experiments.point.belief_counts import EDGES
+from experiments.point.evidence_kinds import SETS, evidence_table
 from experiments.point.inference import PointInference, infer_point
+from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
 from mlci.evidence import PAPER, Rates
 from mlci.inference import Inference
+from mlci.metrics import random_subsets
 from mlci.preparation import infer
 
 WORLD = [
@@ -65,23 +69,44 @@ def inferred(point: PointInference, kind: str) -> Inference:
     "kind",
     ["paper", "exact ends", "model error 0.05", "model error 0.1", "model error 0.2", "calibrated"],
 )
-def test_each_kind_is_an_inference(kind: str, table: pd.DataFrame, point: PointInference) -> None:
-    whole = inferred(point, kind)
+def test_each_kind_is_an_inference(
+    kind: str, table: pd.DataFrame, point: PointInference, settings: Settings
+) -> None:
+    whole, numbers = inferred(point, kind), len(point.demonstrations)
+    subsets = random_subsets(numbers, 3, SETS, stream(settings.seed, Purpose.EVIDENCE, 7))
     rows = table[table["evidence"] == kind]
-    sets = {count: len(point.demonstrations) // count for count in (2, 3)}
-    assert min(sets.values()) >= 2
-    assert len(rows) == sum(sets.values())
-    assert rows.loc[rows["demonstrations"] == 2, "best"].nunique() >= 2  # sets are told apart
-    for _, row in rows.iterrows():
-        count = row["demonstrations"]
-        part = whole.of(slice(count * row["set"], count * (row["set"] + 1)))
-        best = int(part.order[0])
-        assert row["best"] == pytest.approx(part.posterior[best])
-        assert row["right"] == (best == 6)
-        assert row["of_truth"] == pytest.approx(part.posterior[6])
-        assert row["top"] == (part.ranking.rank[6] <= 5)
-        assert row["feasible"] == part.ranking.feasible.sum()
-        assert (row["prior"], row["sets"]) == (0.5 / 10, sets[count])
+    assert (rows["prior"] == 0.5 / 10).all()
+    assert (rows["sets"] == SETS).all()
+    assert (rows["best"] / rows["count"]).nunique() >= 2  # sets are told apart
+    for size in (2, 3):
+        sums: dict[int, np.ndarray] = {}
+        for subset in subsets[size - 1]:
+            part = whole.of(subset)
+            best = int(part.order[0])
+            place = min(int(np.searchsorted(EDGES, part.posterior[best], side="right")), 11)
+            log_truth = np.log(max(part.posterior[6], 1e-10))
+            values = [1, part.posterior[best], best == 6, log_truth, part.ranking.rank[6] <= 5]
+            sums[place] = sums.get(place, 0.0) + np.array(values, dtype=float)
+        found = rows[rows["demonstrations"] == size].set_index("bin")
+        found = found[["count", "best", "right", "log_truth", "top"]]
+        assert found.index.tolist() == sorted(sums)
+        for place, expected in sums.items():
+            assert found.loc[place].to_numpy() == pytest.approx(expected)
+
+
+def test_the_mean_over_random_sets_estimates_that_over_all(
+    table: pd.DataFrame, point: PointInference
+) -> None:
+    whole = inferred(point, "exact ends")
+    every = [whole.of(pair) for pair in combinations(range(len(point.demonstrations)), 2)]
+    for name, value in (
+        ("best", [np.max(part.posterior) for part in every]),
+        ("log_truth", [np.log(max(part.posterior[6], 1e-10)) for part in every]),
+    ):
+        rows = table[(table["evidence"] == "exact ends") & (table["demonstrations"] == 2)]
+        assert np.std(value) > 0
+        error = np.std(value) / np.sqrt(SETS)
+        assert abs(rows[name].sum() / SETS - np.mean(value)) < 4 * error
 
 
 def test_a_world_has_no_sets_that_are_larger_than_it(
@@ -97,11 +122,8 @@ def test_a_world_has_no_sets_that_are_larger_than_it(
         for count in (2, 1)
     )
     small = evidence_table(settings, two, point.calibration)
-    first = table[(table["set"] == 0) & (table["demonstrations"] == 2)]
-    pd.testing.assert_frame_equal(
-        small.drop(columns="sets"), first.drop(columns="sets").reset_index(drop=True)
-    )
-    assert set(small["sets"]) == {1}
+    assert set(small["demonstrations"]) == {2}
+    assert (small["count"] == SETS).all()  # the one set that there is
     nothing = evidence_table(settings, one, point.calibration)
     assert nothing.empty
     assert list(nothing.columns) == list(table.columns)
@@ -121,13 +143,13 @@ def test_the_prior_is_that_of_what_is_true(settings: Settings, point: PointInfer
     ).query("evidence == 'exact ends'")
     assert nothing["prior"].unique() == pytest.approx(0.3)
     assert nothing["top"].isna().all()
-    for _, row in nothing.iterrows():
-        count, number = row["demonstrations"], row["set"]
-        part = dataclasses.replace(inference, rates=PAPER, calibration=None).of(
-            slice(count * number, count * (number + 1))
-        )
-        assert row["of_truth"] == pytest.approx(part.posterior_none)
-        assert row["right"] == 0
+    assert (nothing["right"] == 0).all()
+    whole = dataclasses.replace(inference, rates=PAPER, calibration=None)
+    subsets = random_subsets(len(inference.names), 3, SETS, stream(0, Purpose.EVIDENCE, 0))
+    for size in (2, 3):
+        expected = [np.log(whole.of(subset).posterior_none) for subset in subsets[size - 1]]
+        found = nothing.loc[nothing["demonstrations"] == size, "log_truth"]
+        assert found.sum() == pytest.approx(sum(expected))
 
 
 def test_a_rank_of_just_the_last_place_is_in_the_top(
@@ -147,4 +169,5 @@ def test_a_rank_of_just_the_last_place_is_in_the_top(
     for top, is_in in ((7, 1), (6, 0)):
         ranks = dataclasses.replace(settings.ranks, top=top)
         changed = dataclasses.replace(settings, ranks=ranks)
-        assert set(evidence_table(changed, point, point.calibration)["top"]) == {is_in}
+        table = evidence_table(changed, point, point.calibration)
+        assert (table["top"] == table["count"] * is_in).all()

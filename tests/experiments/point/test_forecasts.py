@@ -9,9 +9,10 @@ import pytest
 from tiny_point import TINY, composed
 
 from experiments.config.read import read_config, read_recorded_config
-from experiments.config.settings import Settings
+from experiments.config.settings import RecordedSettings, Settings
 from experiments.point import forecasts
 from experiments.point.forecasts import forecast_calibration, forecast_table
+from experiments.tracking.sealed import read_sealed, write_sealed
 from experiments.tracking.store import Store
 from mlci.calibration import Calibration, calibrate, calibrate_on
 from mlci.demonstrations import Demonstration
@@ -149,3 +150,52 @@ def test_another_way_to_infer_is_calibrated_anew(
         forecasts.recorded_calibration(settings, None, [path], Store(tmp_path))
     assert len(made) == 2
     assert made[0] != made[1]
+
+
+def recorded_settings(*words: str) -> RecordedSettings:
+    """Of inference with the model of `settings_of()`."""
+    model = ["demonstrations=x", "system=double_integrator", "actions=3", "grid.shape=[12,8]"]
+    return read_recorded_config(composed(*model, *words, name="infer"))
+
+
+@pytest.fixture
+def exported(calibration: Calibration, folder: Path, tmp_path: Path) -> Store:
+    """A copy of the calibration of `settings_of()`."""
+    store = Store(folder)
+    assert forecast_calibration(settings_of(), store).map == calibration.map is not None
+    copy = Store(tmp_path / "calibration")
+    assert store.copy("forecasts", store.keys["forecasts"], copy)
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("word", "fits"),
+    [
+        ("dt=0.5", True),
+        ("inference.prior=0.2", True),
+        ("dt=0.25", False),
+        ("hypotheses.shape=[5,null]", False),
+        ("inference.exact_ends=false", False),
+        ("crossing.time=0.1", False),
+    ],
+)
+def test_an_exported_calibration_is_used_where_it_fits(
+    word: str, fits: bool, calibration: Calibration, exported: Store
+) -> None:
+    words = [word] if word.startswith("dt") else ["dt=0.5", word]
+    found = forecasts.exported_calibration(recorded_settings(*words), exported)
+    assert (found is not None) == fits
+    assert found is None or found.map == calibration.map
+
+
+@pytest.mark.parametrize(
+    "change", [{"source": "another"}, {"depends": 3}, {"depends": []}, {"depends": {"a": 1}}]
+)
+def test_an_exported_calibration_of_another_make_is_not_used(
+    change: dict[str, object], exported: Store
+) -> None:
+    settings = recorded_settings("dt=0.5")
+    assert forecasts.exported_calibration(settings, exported) is not None
+    (note,) = exported.folder.glob("forecasts/*.json")
+    write_sealed(note, {**read_sealed(note), **change})
+    assert forecasts.exported_calibration(settings, exported) is None

@@ -148,3 +148,25 @@ def test_time_of_a_stage_is_counted_even_if_it_fails(tmp_path: Path) -> None:
             store.get("stage", {}, [], fail)
     assert 0.1 <= store.seconds["stage"] < 5
     assert set(store.keys) == {"stage"}
+
+
+def test_a_copied_entry_is_as_whole_as_its_original(tmp_path: Path) -> None:
+    store, other = Store(tmp_path / "store"), Store(tmp_path / "other")
+    one = get(store, Counted(), dt=0.1)
+    get(store, Counted(), dt=0.2)
+    assert store.copy("stage", one.key, other)
+    ((made_from, arrays),) = other.entries("stage")
+    assert made_from["depends"] == {"dt": 0.1}
+    assert arrays.key == one.key
+    np.testing.assert_array_equal(arrays["values"], one["values"])
+    assert len(list(store.entries("stage"))) == 2
+    assert list(store.entries("another")) == []
+
+
+def test_a_damaged_entry_is_neither_copied_nor_listed(tmp_path: Path) -> None:
+    store, other = Store(tmp_path / "store"), Store(tmp_path / "other")
+    key = get(store, Counted()).key
+    (store.folder / "stage" / f"{key}.npz").write_bytes(b"")
+    assert not store.copy("stage", key, other)
+    assert list(store.entries("stage")) == []
+    assert not other.folder.exists()
