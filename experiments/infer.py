@@ -23,8 +23,8 @@ from experiments.config.paths import results_folder
 from experiments.config.read import read_recorded_config, writable_results
 from experiments.config.settings import ESTIMATE, RecordedSettings
 from experiments.console import answer_lines, diagnosis_lines
-from experiments.page.document import page
 from experiments.lookback.recordings import CALIBRATION
+from experiments.page.document import page
 from experiments.point.forecasts import exported_calibration, recorded_calibration
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import plausibilities, read_recordings, together

@@ -15,7 +15,6 @@ from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.recordings.write import write_demonstration
 from mlci.spaces import Box, StateSpace
 
-
 CALIBRATION = "calibration"  # the folder that holds a point's calibration, beside its recordings
 
 

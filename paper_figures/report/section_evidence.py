@@ -52,17 +52,21 @@ def section(results: Results) -> str:
     head += ["over the paper's", "over the best fixed rate", "truth in the top"]
     meant = "; ".join(f"*{name}*: {words}" for name, words in _WORDS.items())
     sizes = kinds.drop_duplicates("demonstrations").sort_values("demonstrations")
-    sets = ", ".join(
-        f"{row['sets']:.0f} of {row['demonstrations']:.0f}" for _, row in sizes.iterrows()
-    )
+    sets = ", ".join(f"{row['demonstrations']:.0f}" for _, row in sizes.iterrows())
     return (
         f"The same sets of demonstrations in {kinds.iloc[0]['worlds']:.0f} points of simulated "
-        f"worlds (disjoint sets: {sets} demonstrations), half of the prior without a constraint "
-        "and half shared by the hypotheses, read with different kinds of evidence. "
+        f"worlds (random sets of {sets} of a point's demonstrations, "
+        f"{kinds['sets'].max() / kinds['worlds'].max():.0f} of each size), half of the prior "
+        "without a constraint and half shared by the hypotheses, read with different kinds of "
+        "evidence. "
         f"{meant}; *model error*: "
         "a fixed rate eta. *Probability* is that of the most likely hypothesis, *off by* its "
-        "distance to how often it is right, by bins, and *by chance* what that would be for as "
-        "many sets if every probability came true; *log of the truth* the mean log posterior of "
+        "distance to how often it is right, by bins. That distance is never negative, so that "
+        "chance alone makes it positive: *by chance* is how far the bins of other worlds, drawn "
+        "from these, are from those of these worlds, and so what *off by* would be if every "
+        "probability came true. *Off by* is given as it is, with chance in it. Intervals are over "
+        "worlds, each with all its sets. "
+        "*Log of the truth* is the mean log posterior of "
         "what is true [nat], 1e-10 at least, and its differences are between the same sets.\n\n"
         + table(head, lines)
         + "\n"

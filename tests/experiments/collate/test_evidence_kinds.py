@@ -122,10 +122,8 @@ def test_chance_is_what_calibrated_worlds_are_off_by() -> None:
         table["prior"] = np.where(table["truth"] == "none", 1 / 3, 1 / 60)
         # All ten sets of a world are right, or none of them: they are as one.
         table["best"], table["right"] = 10 * probability, 10 * (rng.random(60) < probability)
-        table = table.assign(log_truth=-1.0, top=1.0)[
-            ["truth", "cells", "seed", "prior", "sets", "demonstrations", "evidence", "bin"]
-            + list(VALUES)
-        ]
+        opening = ["truth", "cells", "seed", "prior", "sets", "demonstrations", "evidence", "bin"]
+        table = table.assign(log_truth=-1.0, top=1.0)[[*opening, *VALUES]]
         (row,) = evidence_kinds(table).to_dict("records")
         off.append(row["off_by"])
         chance.append(row["by_chance"])
