@@ -121,8 +121,10 @@ def _exported_calibration(settings: RecordedSettings, notes: list[Remark]) -> Ca
     """The calibration that comes with a point's exported demonstrations, if these are ranked."""
     given = settings.demonstrations
     paths = [given] if isinstance(given, str) else given
-    folder = Path(paths[0]).expanduser() / CALIBRATION
-    if len(paths) > 1 or not folder.is_dir():
+    if len(paths) != 1:
+        return None
+    folder = Path(paths[0]) / CALIBRATION
+    if not folder.is_dir():
         return None
     calibration = exported_calibration(settings, Store(folder))
     notes.append(Remark(shown_path(folder), _NOT_EXPORTED if calibration is None else _EXPORTED))
