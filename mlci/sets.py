@@ -108,7 +108,7 @@ def set_posterior(
     each, none = posterior(gain, 1 - float(np.sum(share)), share)
     probability, gains = np.zeros((count, count)), np.full((count, count), -np.inf)
     probability[i, j], gains[i, j] = each, gain
-    return SetPosterior(none, probability, gains)
+    return SetPosterior(float(none), probability, gains)
 
 
 def infer_sets(
