@@ -15,6 +15,7 @@ CHANCE = ("by_chance", "by_chance_high")
 # Criterion: which kind, at how many demonstrations, and how far off it may be at most.
 MOST_OFF = 0.05
 JUDGED = ("calibrated", (5, 10))
+FALLBACK, FALLBACK_MOST_OFF = "model error 0.1", 0.07  # where evidence cannot be calibrated
 
 _WORDS = {
     "paper": "the paper's: Phi as it is, from cell to cell",
@@ -81,12 +82,11 @@ def _judgement(kinds: pd.DataFrame) -> str:
     judged = [size for size in sizes if size in rows.index]
     if not judged:
         return "No evidence is calibrated in this study.\n"
-    off = ", ".join(f"{number(rows.loc[size, 'off_by'])} after {size}" for size in judged)
-    kept = all(rows.loc[size, "off_by"] <= MOST_OFF for size in judged)
-    text = (
-        f"Calibrated evidence is off by {off} demonstrations, "
-        f"{'within' if kept else 'not within'} {MOST_OFF}."
-    )
+    text = f"Calibrated evidence is {_distance(rows.loc[judged], MOST_OFF)}."
+    fallback = kinds[kinds["evidence"] == FALLBACK].set_index("demonstrations")
+    if set(judged) <= set(fallback.index):
+        off = _distance(fallback.loc[judged], FALLBACK_MOST_OFF)
+        text += f" A fixed rate of 0.1, for where it cannot be calibrated, is {off}."
     for size in rows.index.difference(list(sizes)):
         row = rows.loc[size]
         if row["right"] > row["best"]:
@@ -99,6 +99,13 @@ def _judgement(kinds: pd.DataFrame) -> str:
                 "than one who does not meet it, and so refutes them sooner."
             )
     return text + "\n"
+
+
+def _distance(rows: pd.DataFrame, most: float) -> str:
+    """How far off a kind of evidence is after each number of demonstrations, and whether within."""
+    off = ", ".join(f"{number(value)} after {size}" for size, value in rows["off_by"].items())
+    within = "within" if (rows["off_by"] <= most).all() else "not within"
+    return f"off by {off} demonstrations, {within} {most}"
 
 
 def _value(row: pd.Series, name: str) -> str:

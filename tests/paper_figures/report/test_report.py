@@ -401,7 +401,7 @@ def test_evidence_is_compared_and_judged(tmp_path: Path) -> None:
         | {"right": right, "by_chance": 0.015, "by_chance_high": 0.03}
         | {f"{name}{end}": value for name, value in scores.items() for end in ("", "_low", "_high")}
         for size, right in ((5, 0.1), (10, 0.1), (20, 0.3))
-        for kind in ("paper", "calibrated")
+        for kind in ("paper", "calibrated", "model error 0.1")
     ]
     table = pd.DataFrame(rows)
     write(tmp_path, "calibration", evidence_kinds=table)
@@ -414,6 +414,7 @@ def test_evidence_is_compared_and_judged(tmp_path: Path) -> None:
     write(tmp_path / "worse", "calibration", evidence_kinds=table)
     worse = section_evidence.section(Results(tmp_path / "worse"))
     assert "0.0700 after 10 demonstrations, not within 0.05." in worse
+    assert "is off by 0.0200 after 5, 0.0700 after 10 demonstrations, within 0.07." in worse
 
 
 def test_control_noise_explains_what_changes_with_few_actions_alone(tmp_path: Path) -> None:
