@@ -177,8 +177,7 @@ class TrajectoryDistribution:
             moves, whose rows sum to 1.
         """
         cells = np.flatnonzero(self.log_z[t] > -np.inf)
-        moves = self.model.moves_of(cells)
-        return cells, move_probabilities(moves, self.model.truth, self.log_z, t, cells)
+        return cells, move_probabilities(*self.model.policy_moves(cells), self.log_z, t, cells)
 
     def avoidance_probabilities(self) -> Floats:
         """alpha_i (C,): the probability that a trajectory does not cross region i.
@@ -234,13 +233,13 @@ class TrajectoryDistribution:
     def draw_moves(self, t: int, cells: Ints, rng: np.random.Generator) -> tuple[Ints, Ints]:
         """A move of each of some cells (B,) at step t by the soft policy, and its successor."""
         here, place = np.unique(cells, return_inverse=True)
-        moves = self.model.moves_of(here)
-        probabilities = move_probabilities(moves, self.model.truth, self.log_z, t, here)
+        successor, reward = self.model.policy_moves(here)
+        probabilities = move_probabilities(successor, reward, self.log_z, t, here)
         cumulative = np.cumsum(probabilities, axis=1)[place]
         # Scaled by the last entry, so that rounding cannot lift a draw past every move.
         draws = rng.random(len(cells))[:, None] * cumulative[:, -1:]
         move = np.argmax(cumulative > draws, axis=1)
-        return move, moves.successor[place, move]
+        return move, successor[place, move]
 
     def _require_possible(self, consequence: str) -> None:
         """Raise where there is no distribution."""

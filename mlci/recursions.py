@@ -15,7 +15,6 @@ import numpy as np
 
 from mlci.compiled import compiled
 from mlci.merged_moves import MergedMoves
-from mlci.single_moves import SingleMoves
 from mlci.spaces import Bools, Floats, Ints
 
 ALPHA_BYTES = 1 << 29  # of probabilities held at once, else regions go block by block
@@ -137,10 +136,11 @@ def _step_back(
 
 
 def move_probabilities(
-    moves: SingleMoves, truth: Bools, log_z: Floats, t: int, cells: Ints
+    successor: Ints, reward: Floats, log_z: Floats, t: int, cells: Ints
 ) -> Floats:
-    """(Q, M) probabilities of the moves of cells that carry probability at step t."""
-    value = moves.reward + log_z[t + 1, moves.successor]
-    value = np.where(moves.allowed(truth), value, -np.inf)
-    probabilities = np.exp(value - log_z[t, cells, None])
+    """(Q, M) probabilities of moves (Q, M) of cells that carry probability at step t.
+
+    The reward of a move that is not allowed is -inf.
+    """
+    probabilities = np.exp(reward + log_z[t + 1, successor] - log_z[t, cells, None])
     return np.asarray(probabilities / np.sum(probabilities, axis=1, keepdims=True))

@@ -59,6 +59,10 @@ class SingleMoves:
         crossed = (self.crosses @ truth).reshape(self.successor.shape)
         return np.asarray((self.successor >= 0) & ~crossed)
 
+    def allowed_reward(self, truth: Bools) -> Floats:
+        """(Q, M) reward of a move, -inf where it is not allowed."""
+        return np.where(self.allowed(truth), self.reward, -np.inf)
+
     def _rows(self, cells: Ints) -> sparse.csr_matrix:
         """The rows of `crosses` that belong to some cells."""
         moves = self.successor.shape[1]

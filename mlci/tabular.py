@@ -129,6 +129,18 @@ class TabularModel:
         parts = [self._follow(cells[first : first + size]) for first in range(0, len(cells), size)]
         return SingleMoves.joined(parts) if len(parts) != 1 else parts[0]
 
+    def policy_moves(self, cells: Ints) -> tuple[Ints, Floats]:
+        """Successors (Q, M) of the moves of some cells, and rewards, -inf where not allowed."""
+        if self.kept is not None:
+            return self.kept.successor[cells], self._kept_reward[cells]
+        moves = self.moves_of(cells)
+        return moves.successor, moves.allowed_reward(self.truth)
+
+    @cached_property
+    def _kept_reward(self) -> Floats:
+        assert self.kept is not None
+        return self.kept.allowed_reward(self.truth)
+
     def _follow(self, cells: Ints) -> SingleMoves:
         """The moves of some cells (Q,) by the dynamics."""
         inside = self.grid.points_inside(self.samples, cells).reshape(-1, len(self.grid.shape))
@@ -156,10 +168,7 @@ class TabularModel:
         """(..., C) which regions trajectories of moves (..., T) from cells (..., T) cross."""
         here, place = np.unique(cells, return_inverse=True)
         rows = self.moves_of(here).crosses[place.ravel() * self.moves + moves.ravel()]
-        crossed = np.zeros((*moves.shape, len(self.regions)), dtype=bool)
-        hit = rows.tocoo()
-        crossed.reshape(-1, len(self.regions))[hit.row, hit.col] = True
-        return np.asarray(crossed.any(axis=-2))
+        return np.any(rows.toarray().reshape(*moves.shape, len(self.regions)), axis=-2)
 
     def with_temperature(self, temperature: float) -> TabularModel:
         """The model at another temperature: moves are the same, rewards scale.

@@ -49,10 +49,13 @@ def trajectory_tables(
         cells that the trajectory of `example` visits.
     """
     visits, crossed = [], []
-    for trial, (cells, moves) in trajectories.items():
+    for trial, (cells, _) in trajectories.items():
         visits += [(trial, step, cell) for step, cell in enumerate(cells)]
-        regions = model.crossed(cells[:-1], moves)[hypotheses]
-        crossed += [(trial, "sampled", i) for i in np.flatnonzero(regions)]
+    if trajectories:
+        cells, moves = map(np.stack, zip(*trajectories.values(), strict=True))
+        regions = model.crossed(cells[:, :-1], moves)[:, hypotheses]
+        for trial, row in zip(trajectories, regions, strict=True):
+            crossed += [(trial, "sampled", i) for i in np.flatnonzero(row)]
     for trial, regions in violated.items():
         crossed += [(trial, "demonstration", i) for i in np.flatnonzero(regions)]
     visited = np.unique(() if example is None else trajectories[example][0]).astype(np.int64)
