@@ -14,10 +14,8 @@ Motions stop at the bounds of the state space and slide along them: a rate that 
 bounds counts as 0.
 
 A motion is known at samples, and comes closest to K between two of them. What is computed is a
-lower bound of v: between samples the motion stays within step / 4 times the change of its rate of
-the chord (twice what a steady acceleration needs), and along a chord the signed distance to a box
-is convex, so that its tangents bound it from below. Not covered is the error of the integrator
-itself, of fourth order in the step.
+lower bound of v, by `closest_approach`. Not covered is the error of the integrator itself, of
+fourth order in the step.
 """
 
 from __future__ import annotations
@@ -27,11 +25,12 @@ from functools import cached_property
 
 import numpy as np
 
+from mlci.closest_approach import Boxes
 from mlci.grids import Grid
 from mlci.reachability import SafeSet
 from mlci.regions import Regions
 from mlci.simulate import rk4_step, step_count
-from mlci.spaces import Bools, Box, Floats, Ints, StateSpace, middle_and_half
+from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 from mlci.system_check import check_affine
 from mlci.systems import System
 
@@ -39,8 +38,8 @@ _AT_ONCE = 1 << 14  # states; more do not stay in the cache
 _STEPS_BETWEEN = 8  # steps after which motions that cannot matter any more are dropped
 _LOOK_AHEAD = 0.05  # of the horizon, after which controls are compared; no step is longer
 _LOSS = 0.1  # of the smallest cell that the bow of a motion in one step may be
+_ENOUGH = 2.0  # times the depth of K up to which v is told
 _INSTANT = 1e-4  # [s] over which the change of a rate is measured
-_CUTS = 4  # tangents that close in on the least distance along a chord
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +71,9 @@ class _Sliding(System):
         """h at the nearest states within the bounds; the rates across a bound are not stopped."""
         return self.system.dynamics(self.clip(states), controls)
 
-    def rates(self, states: Floats, controls: Floats) -> Floats:
-        """h at states within the bounds, 0 where it points across a bound."""
+    def stopped(self, rates: Floats, states: Floats) -> Floats:
+        """Rates at states within the bounds, 0 where they point across a bound."""
         lower, upper = self._limits
-        rates = self.system.dynamics(states, controls)
         inward = ((rates < 0) | (states < upper)) & ((rates > 0) | (states > lower))
         return rates * inward
 
@@ -86,6 +84,11 @@ def tabulate_escapes(
     """Tabulate the lower bound of v at the cell centres of a grid; see the module's head.
 
     The step between samples is so short that the bound loses about a tenth of a cell.
+
+    v is told up to twice the depth of K (or a cell's width, if that is more): a larger one is put
+    down as that. It is computed where K is so near, and from there on outwards, until it is known at
+    all neighbours of every smaller one. Who comes to K from farther away first passes a cell with
+    no smaller one at its corners, from where a constant control keeps out of K.
 
     Args:
         system: the dynamics and the control box.
@@ -98,11 +101,35 @@ def tabulate_escapes(
     """
     check_affine(system)
     step = _step_for(system, grid, constraints, horizon)
-    return SafeSet.from_values(grid, escape_value(system, constraints, grid.centers, horizon, step))
+    boxes, distances = Boxes.of(constraints), constraints.signed_distance(grid.centers)
+    depth = np.max(np.min(boxes.halves, axis=1))
+    enough = _ENOUGH * max(depth, np.max(grid.widths[boxes.counted], initial=0.0))
+    values, known, low = np.full(grid.size, enough), np.zeros(grid.size, bool), distances < enough
+    while len(new := np.flatnonzero(_with_neighbours(low, grid) & ~known)):
+        v = escape_value(system, constraints, grid.centers[new], horizon, step, enough)
+        values[new], known[new], low[new] = np.minimum(v, enough), True, v < enough
+    return SafeSet.from_values(grid, values)
+
+
+def _with_neighbours(cells: Bools, grid: Grid) -> Bools:
+    """Some cells (S,) and all that touch one of them, by a corner at least."""
+    wide = cells.reshape(grid.shape)
+    for d, count in enumerate(grid.shape):
+        before, after = (np.take(wide, np.arange(count) + k, axis=d, mode="wrap") for k in (-1, 1))
+        if not grid.space.periodic[d]:
+            np.moveaxis(before, d, 0)[0] = False
+            np.moveaxis(after, d, 0)[-1] = False
+        wide = wide | before | after
+    return wide.ravel()
 
 
 def escape_value(
-    system: System, constraints: Regions, states: Floats, horizon: float, step: float
+    system: System,
+    constraints: Regions,
+    states: Floats,
+    horizon: float,
+    step: float,
+    enough: float = np.inf,
 ) -> Floats:
     """A lower bound (B,) of v at states (B, n), in the unit of dist_K.
 
@@ -112,31 +139,34 @@ def escape_value(
         states: (B, n) where the motions begin.
         horizon: for how long they last [s].
         step: time between the samples of the motions [s]; divides the horizon.
+        enough: once one control achieves it, the others are not tried.
     """
-    steps = step_count(horizon, step)
+    steps, boxes = step_count(horizon, step), Boxes.of(constraints)
     sliding, parts = _Sliding(system), [np.empty(0)]
     for first in range(0, len(states), _AT_ONCE):
-        part = np.asfortranarray(states[first : first + _AT_ONCE])
+        part = np.asfortranarray(states[first : first + _AT_ONCE], dtype=float)
         order = _promising(sliding, constraints, part, horizon * _LOOK_AHEAD)
-        best = np.full(len(part), -np.inf)
+        distances, best = constraints.signed_distance(part), np.full(len(part), -np.inf)
         for controls in system.control_box.vertices()[order]:
-            _improve(best, sliding, constraints, part, controls, steps, step)
+            hopeful = np.flatnonzero(best < np.minimum(distances, enough))
+            motions = part[hopeful], controls[hopeful], distances[hopeful], best[hopeful]
+            best[hopeful] = _held(sliding, boxes, *motions, steps, step)
         parts.append(best)
     return np.concatenate(parts)
 
 
 def _step_for(system: System, grid: Grid, constraints: Regions, horizon: float) -> float:
     """The step [s] at which the bow of a motion in a step is at most `_LOSS` of a cell."""
-    counts = _counted(constraints)
+    counted = Boxes.of(constraints).counted
     fastest = 0.0
     for first in range(0, grid.size, _AT_ONCE):
         states = grid.centers[first : first + _AT_ONCE]
         for control in system.control_box.vertices():
             rates = system.dynamics(states, control)
             then = system.dynamics(states + _INSTANT * rates, control)
-            change = _length((then - rates)[:, counts]) / _INSTANT
-            fastest = max(fastest, float(np.max(change)))
-    loss = _LOSS * np.min(grid.widths[counts], initial=np.inf)
+            change = np.sum(((then - rates)[:, counted] / _INSTANT) ** 2, axis=1)
+            fastest = max(fastest, float(np.sqrt(np.max(change))))
+    loss = _LOSS * np.min(grid.widths[counted], initial=np.inf)
     steps = max(np.sqrt(fastest / (4 * loss)) * horizon, 1 / _LOOK_AHEAD)
     return float(horizon / np.ceil(steps))
 
@@ -153,109 +183,50 @@ def _promising(system: _Sliding, constraints: Regions, states: Floats, ahead: fl
     return np.argsort(-np.array(distances), axis=0, kind="stable")
 
 
-def _improve(
-    best: Floats,
+def _held(
     system: _Sliding,
-    constraints: Regions,
+    boxes: Boxes,
     states: Floats,
     controls: Floats,
+    distances: Floats,
+    best: Floats,
     steps: int,
     step: float,
-) -> None:
-    """Raise best (B,) to what holding controls (B, m) from states (B, n) achieves, if that is more.
+) -> Floats:
+    """What holding controls (B, m) from states (B, n) achieves (B,), if that is more than best.
+
+    The states are at distances (B,) from K.
 
     A motion counts as long as it is better than the best.
     """
-    counts = _counted(constraints)
-    distance = constraints.signed_distance(states)
-    row = np.flatnonzero(best < distance)
-    now, control = np.asfortranarray(states[row]), np.asfortranarray(controls[row])
-    distance, least = distance[row], distance[row]
-    rates = system.rates(now, control)
+    best, row = best.copy(), np.arange(len(states))
+    now, control = np.asfortranarray(states), np.asfortranarray(controls)
+    distance, least = distances.copy(), distances.copy()
+    drift = np.asfortranarray(system.dynamics(now, control))
+    rates = system.stopped(drift, now)
     for k in range(steps):
-        then = system.clip(rk4_step(system, now, control, step))
-        distance_then, rates_then = constraints.signed_distance(then), system.rates(then, control)
-        bow = step / 4 * _length((rates_then - rates)[:, counts])
-        chord = _length((then - now)[:, counts])
-        near = np.flatnonzero((distance + distance_then - chord) / 2 - bow < least)
-        on_chord = _least_on_chords(constraints, now[near], then[near]) - bow[near]
-        least[near] = np.minimum(least[near], on_chord)
-        now, distance, rates = then, distance_then, rates_then
+        then = _rk4_step(system, now, control, drift, step)
+        drift = np.asfortranarray(system.dynamics(then, control))
+        rates_then = system.stopped(drift, then)
+        boxes.approach((now, then), (rates, rates_then), step, distance, least)
+        now, rates = then, rates_then
         if k % _STEPS_BETWEEN == 0:
-            moves, counted = np.any(rates != 0, axis=1), least > best[row]
-            best[row[counted & ~moves]] = least[counted & ~moves]
-            go = counted & moves
+            moves, counts = np.any(rates != 0, axis=1), least > best[row]
+            best[row[counts & ~moves]] = least[counts & ~moves]
+            go = counts & moves
             row, least, distance = row[go], least[go], distance[go]
-            now, control, rates = (np.asfortranarray(each[go]) for each in (now, control, rates))
+            now, control, rates, drift = (
+                np.asfortranarray(each[go]) for each in (now, control, rates, drift)
+            )
     best[row] = np.maximum(best[row], least)
+    return best
 
 
-def _length(vectors: Floats) -> Floats:
-    """Euclidean length (B,) of vectors (B, n)."""
-    return np.sqrt(np.einsum("bi,bi->b", vectors, vectors))
-
-
-def _counted(constraints: Regions) -> Bools:
-    """Which dimensions (n,) the signed distance to K depends on."""
-    each = [_counts(constraints, region) for region in range(len(constraints))]
-    return np.any(each, axis=0)
-
-
-def _counts(constraints: Regions, region: int) -> Bools:
-    """Which dimensions (n,) the signed distance to a region depends on."""
-    space, (_, half) = constraints.space, middle_and_half(constraints.box(region))
-    return np.isfinite(half) & ~(space.periodic & (2 * half >= space.bounds.widths))
-
-
-def _least_on_chords(constraints: Regions, starts: Floats, ends: Floats) -> Floats:
-    """A lower bound (B,) of dist_K along the straight ways from starts (B, n) to ends (B, n)."""
-    least = np.full(len(starts), np.inf)
-    for region in range(len(constraints)):
-        least = np.minimum(least, _least_to_box(constraints, region, starts, ends))
-    return least
-
-
-def _least_to_box(constraints: Regions, region: int, starts: Floats, ends: Floats) -> Floats:
-    """`_least_on_chords` for one region, by cuts: where two tangents meet the next one is taken."""
-    counts, space = _counts(constraints, region), constraints.space
-    middle, half = middle_and_half(constraints.box(region))
-    half, chords = half[counts], (ends - starts)[:, counts]
-    first = space.difference(starts, middle)[:, counts]
-    last = space.difference(ends, middle)[:, counts]
-    value, slope = _box_distance(first, half, chords)
-    end_value, end_slope = _box_distance(last, half, chords)
-    least = np.minimum(value, end_value)
-    # Where the short way round changes sides the distance is not convex, but it is far.
-    turned = np.any(np.abs(first + chords - last) > 1e-9 * space.bounds.widths[counts], axis=1)
-    least[turned] = ((value + end_value - _length(chords)) / 2)[turned]
-    rows = np.flatnonzero((slope < 0) & (end_slope > 0) & ~turned)
-    first, chords = first[rows], chords[rows]
-    low = np.stack([np.zeros(len(rows)), value[rows], slope[rows]])
-    high = np.stack([np.ones(len(rows)), end_value[rows], end_slope[rows]])
-    for cut in range(_CUTS + 1):
-        # low and high hold a place on the chord, the distance there and its derivative.
-        drop = high[1] - low[1] - high[2] * (high[0] - low[0])
-        ahead = drop / (low[2] - high[2])
-        if cut == _CUTS:
-            break
-        place = low[0] + ahead
-        value, slope = _box_distance(first + place[:, None] * chords, half, chords)
-        found = np.stack([place, value, slope])
-        low, high = np.where(slope < 0, found, low), np.where(slope < 0, high, found)
-    least[rows] = low[1] + low[2] * ahead
-    return least
-
-
-def _box_distance(offsets: Floats, half: Floats, chords: Floats) -> tuple[Floats, Floats]:
-    """Signed distance (B,) at offsets (B, k) from a box's centre, and its rise (B,) by chords."""
-    beyond = np.abs(offsets) - half
-    outside = np.maximum(beyond, 0.0)
-    away, deepest = _length(outside), np.argmax(beyond, axis=1)
-    rows = np.arange(len(offsets))
-    inside = away == 0
-    outside[rows[inside], deepest[inside]] = 1.0  # the normal, times `away` where that is not 0
-    rise = np.einsum("bi,bi->b", outside, np.sign(offsets) * chords)
-    return (
-        np.where(inside, beyond[rows, deepest], away),
-        rise / np.where(inside, 1.0, away),
-    )
+def _rk4_step(
+    system: _Sliding, states: Floats, controls: Floats, k1: Floats, step: float
+) -> Floats:
+    """`rk4_step` within the bounds from states (B, n) whose rates k1 (B, n) are known."""
+    k2 = system.dynamics(states + step / 2 * k1, controls)
+    k3 = system.dynamics(states + step / 2 * k2, controls)
+    k4 = system.dynamics(states + step * k3, controls)
+    return np.asfortranarray(system.clip(states + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from mlci.constant_controls import escape_value, tabulate_escapes
+from mlci.constant_controls import _step_for, escape_value, tabulate_escapes
 from mlci.grids import Grid
 from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
@@ -188,6 +188,27 @@ def least_distances(system, keep_out, states, seconds, dt):
 
 PENDULUM = Pendulum(control_limit=0.5)
 TWO_PARTS = Regions(PENDULUM.space, [[np.pi, 0.0], [1.0, -1.0]], [[1.2 * np.pi, 1.2], [1.2, -0.8]])
+ROUND_THE_SEAM = Regions(PENDULUM.space, [[-0.4, -0.5]], [[0.2, 1.2]])
+
+
+@pytest.mark.parametrize(
+    ("system", "keep_out", "shape", "enough"),
+    [
+        (TELESCOPE, PAIN, (13, 7, 9, 7), 2 * 6 / 9),  # a cell is wider than K is deep
+        (PENDULUM, ROUND_THE_SEAM, (41, 41), 0.6),
+    ],
+)
+def test_a_table_holds_v_at_every_centre_up_to_twice_the_depth_of_k(
+    system, keep_out, shape, enough
+):
+    grid = Grid(system.space, shape)
+    table = tabulate_escapes(system, grid, keep_out, horizon=3.0)
+    step = _step_for(system, grid, keep_out, 3.0)
+    exact = escape_value(system, keep_out, grid.centers, 3.0, step)
+    assert np.max(table.values) == pytest.approx(enough)
+    assert 0.05 < np.mean(table.values < enough) < 0.9
+    np.testing.assert_allclose(table.values, np.minimum(exact, enough), rtol=1e-12, atol=1e-12)
+    assert np.any((table.values < enough) & (keep_out.signed_distance(grid.centers) > enough))
 
 
 @pytest.mark.parametrize("step", [0.1, 0.05])
