@@ -86,8 +86,8 @@ def tabulate_escapes(
     The step between samples is so short that the bound loses about a tenth of a cell.
 
     v is told up to twice the depth of K (or a cell's width, if that is more): a larger one is put
-    down as that. It is computed where K is so near, and from there on outwards, until it is known at
-    all neighbours of every smaller one. Who comes to K from farther away first passes a cell with
+    down as that. It is computed where K is so near, and from there on outwards, until it is known
+    at all neighbours of each smaller one. Who comes to K from farther away first passes a cell with
     no smaller one at its corners, from where a constant control keeps out of K.
 
     Args:
