@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from mlci.spaces import Bools, Floats, Ints
 
@@ -31,6 +30,8 @@ def fixed_point(flow: sparse.csr_matrix, source: Floats) -> Floats:
     """
     if not len(source):
         return np.empty(0)
+    from scipy.sparse.linalg import splu  # loads scipy.linalg, only where it is used
+
     system = sparse.identity(len(source), format="csc") - flow
     order = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}}
     try:
