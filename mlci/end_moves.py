@@ -9,6 +9,7 @@ cell would seem unavoidable, although the demonstration begins and ends outside 
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
 
 from mlci.merged_moves import MergedMoves
 from mlci.simulate import rollout
@@ -18,26 +19,31 @@ from mlci.tabular import TabularModel, follow
 
 def first_moves(model: TabularModel, start: Floats) -> MergedMoves:
     """Every action from a state (n,), as far as it stays in the space and out of the truth."""
-    return _allowed(model, *_from_state(model, start))
+    cell, path, reward = _from_state(model, start)
+    return _allowed(model, cell, reward, *follow(model.grid, model.regions, path))
 
 
 def last_moves(model: TabularModel, cells: Ints, goal_cells: Ints, goal: Box) -> MergedMoves:
     """The moves from some cells, in order, into the goal's cells, bent to end in the goal."""
-    # Whether the truth allows a move is seen on the bent path.
-    cells = np.intersect1d(cells, model.merged.cells_into(goal_cells))
-    moves = model.moves_of(cells)
-    row, move = np.nonzero(np.isin(moves.successor, goal_cells))
-    cell = cells[row]
-    origin, action = model.move_origins(cell, move), model.actions[model.action[move]]
-    path = rollout(model.system, origin, action[:, None, :], model.dt, model.substeps)
-    return _allowed(model, cell, _bent(model, path, goal), moves.reward[row, move])
+    parts = []
+    for block in model.blocks(np.intersect1d(cells, model.merged.cells_into(goal_cells))):
+        # Whether the truth allows a move is seen on the bent path.
+        moves = model.moves_of(block)
+        row, move = np.nonzero(np.isin(moves.successor, goal_cells))
+        origin, action = model.move_origins(block[row], move), model.actions[model.action[move]]
+        path = rollout(model.system, origin, action[:, None, :], model.dt, model.substeps)
+        bent = follow(model.grid, model.regions, _bent(model, path, goal))
+        parts.append((block[row], moves.reward[row, move], *bent))
+    cell, reward, successor = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    return _allowed(model, cell, reward, successor, sparse.vstack([part[3] for part in parts]))
 
 
 def only_moves(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> MergedMoves:
     """The moves of a trajectory of one step: from a state into the goal region."""
     cell, path, reward = _from_state(model, start)
     into = np.isin(model.grid.index(path[:, -1]), goal_cells)
-    return _allowed(model, cell[into], _bent(model, path[into], goal), reward[into])
+    bent = follow(model.grid, model.regions, _bent(model, path[into], goal))
+    return _allowed(model, cell[into], reward[into], *bent)
 
 
 def _from_state(model: TabularModel, start: Floats) -> tuple[Ints, Floats, Floats]:
@@ -55,11 +61,13 @@ def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
     return path - share * beyond[:, None, :]
 
 
-def _allowed(model: TabularModel, cell: Ints, path: Floats, reward: Floats) -> MergedMoves:
-    """The moves with paths (L, K+1, n), in order of cell; those that leave the space or cross the
-    truth are forbidden. None is merged with another.
+def _allowed(
+    model: TabularModel, cell: Ints, reward: Floats, successor: Ints, crosses: sparse.csr_matrix
+) -> MergedMoves:
+    """L moves, in order of cell; those that leave the space or cross the truth are forbidden.
+
+    None is merged with another.
     """
-    successor, crosses = follow(model.grid, model.regions, path)
     forbidden = (successor < 0) | (crosses @ model.truth)
     return MergedMoves(
         begins=np.searchsorted(cell, np.arange(model.states + 1)),

@@ -114,8 +114,8 @@ class TabularModel:
 
     def move_origins(self, cells: Ints, moves: Ints) -> Floats:
         """(L, n) the states in which some moves of some cells begin."""
-        points = self.moves // len(self.actions)  # k^n start points of a cell
-        return self.grid.points_inside(self.samples, cells)[np.arange(len(cells)), moves % points]
+        inside = self.grid.points_inside(self.samples, cells)
+        return inside[np.arange(len(cells)), moves % inside.shape[1]]
 
     def move_reward(self, states: Floats, controls: Floats) -> Floats:
         """(L,) reward r dt / temperature [nat] of controls (L, m) held from states (L, n)."""
@@ -126,8 +126,8 @@ class TabularModel:
         if self.kept is not None:
             return self.kept.of(cells)
         size = max(1, _PATHS_AT_ONCE // self.moves)
-        parts = [self._follow(cells[first : first + size]) for first in range(0, len(cells), size)]
-        return SingleMoves.joined(parts) if len(parts) != 1 else parts[0]
+        firsts = range(0, max(1, len(cells)), size)
+        return SingleMoves.joined([self._follow(cells[first : first + size]) for first in firsts])
 
     def policy_moves(self, cells: Ints) -> tuple[Ints, Floats]:
         """Successors (Q, M) of the moves of some cells, and rewards, -inf where not allowed."""
@@ -158,11 +158,12 @@ class TabularModel:
         """The moves of each cell, those with the same successor and crossings merged."""
         return merge_moves(self.moves_of(cells) for cells in self.blocks()).under(self.truth)
 
-    def blocks(self) -> Iterator[Ints]:
-        """All cells in order, in blocks of so many moves as one step of work should hold."""
+    def blocks(self, cells: Ints | None = None) -> Iterator[Ints]:
+        """Some cells, or all, in blocks of so many moves as one step of work should hold."""
+        cells = np.arange(self.states) if cells is None else cells
         size = max(1, _MOVES_AT_ONCE // self.moves)
-        for first in range(0, self.states, size):
-            yield np.arange(first, min(first + size, self.states))
+        for first in range(0, max(1, len(cells)), size):
+            yield cells[first : first + size]
 
     def crossed(self, cells: Ints, moves: Ints) -> Bools:
         """(..., C) which regions trajectories of moves (..., T) from cells (..., T) cross."""
@@ -249,8 +250,7 @@ def discretize(
         actions: (A, m) controls, held for dt.
         dt: time step [s].
         regions: the C regions whose crossings are kept: hypotheses, truths, or both.
-        samples: k; the moves of an action start at k^n points of the cell. 1 is the centre model,
-            more the cell-averaged one (see the module's head).
+        samples: k; an action's moves start at k^n points of the cell (see the module's head).
         temperature: divides the reward (2).
         progress: called with how many cells are done, and of how many.
     """
@@ -278,8 +278,8 @@ def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int
     """
     shortest = dt
     quarter = np.where(grid.space.periodic, grid.space.bounds.widths / 4, np.inf)
-    for first in range(0, grid.size, _MOVES_AT_ONCE):
-        states = grid.centers[first : first + _MOVES_AT_ONCE]
+    for first in range(0, grid.size, _PATHS_AT_ONCE):
+        states = grid.centers[first : first + _PATHS_AT_ONCE]
         for action in actions:
             speed = system.dynamics(states, action[None, :])
             by_state, _ = system.jacobians(states, action[None, :])

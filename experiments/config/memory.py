@@ -7,11 +7,15 @@ import os
 
 from experiments.config.settings import ModelSettings, Settings
 from mlci.recursions import ALPHA_BYTES
+from mlci.tabular import MOST_KEPT
 
 # Measured on points of 0.4 to 4 million moves, and `python -m tests.benchmark` compares: a move has
 # successor, reward, its place among the cell's successors and the regions that it crosses, and most
 # of these twice while what is read from the store is joined.
 _BYTES_A_MOVE = 100
+# A larger model keeps merged moves alone, of which a cell has about three an action, however many
+# start points it has: successor, weight, the regions that it crosses, and one of these twice.
+_MERGED_AN_ACTION, _BYTES_A_MERGED_MOVE = 4, 50
 _BYTES_A_STEP = 16  # and cell: log Z, and which cells can be occupied
 _BYTES_A_HYPOTHESIS = 30_000  # while crossings are found
 _BYTES_AT_REST = 200_000_000  # the interpreter, its packages, and blocks of work
@@ -21,12 +25,15 @@ def expected_memory(settings: ModelSettings) -> float:
     """Bytes that a point takes at most for its tabular model and the inference."""
     cells = math.prod(settings.grid.shape)
     dimensions = settings.model.space.dimension
-    moves = math.prod(settings.action_counts) * settings.transition.samples**dimensions
+    actions = math.prod(settings.action_counts)
+    moves = actions * settings.transition.samples**dimensions
+    merged = min(moves, _MERGED_AN_ACTION * actions)
+    is_kept = float(cells) * moves <= MOST_KEPT
     hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
     hypotheses += len(settings.hypotheses.boxes)
     steps = settings.horizon / settings.dt if isinstance(settings, Settings) else 0
     return (
-        float(cells) * moves * _BYTES_A_MOVE
+        float(cells) * (moves * _BYTES_A_MOVE if is_kept else merged * _BYTES_A_MERGED_MOVE)
         + float(cells) * steps * _BYTES_A_STEP
         + float(hypotheses) * _BYTES_A_HYPOTHESIS
         + min(ALPHA_BYTES, float(cells) * hypotheses * 16)
