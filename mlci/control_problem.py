@@ -13,6 +13,7 @@ never influence each other.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,18 +26,32 @@ from mlci.systems import System
 class ControlFilter(Protocol):
     """What may stand between the optimised control and the system."""
 
-    def apply(self, states: Floats, controls: Floats) -> Floats:
-        """Applied controls (..., m) at states (..., n) and wanted controls (..., m)."""
+    def apply(self, states: Floats, controls: Floats, ahead: Floats | None = None) -> Floats:
+        """Applied controls (..., m) at states (..., n) and wanted controls (..., m).
+
+        The optimiser knows to what states (..., n) the wanted controls lead in a time step: `ahead`
+        saves a filter that looks there the step.
+        """
+
+    def clearance(self, states: Floats) -> Floats:
+        """How far (...) states (..., n) may move, Euclidean, before it could change a control.
+
+        More exactly, a control that leads no further passes. 0, where nothing is known, is safe.
+        """
+        return np.zeros(states.shape[:-1])
 
     def linearize(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
         """Derivatives of the applied control: by state (..., m, n), by control (..., m, m)."""
 
 
-class NoFilter:
+class NoFilter(ControlFilter):
     """Every control passes."""
 
-    def apply(self, states: Floats, controls: Floats) -> Floats:
+    def apply(self, states: Floats, controls: Floats, ahead: Floats | None = None) -> Floats:
         return controls
+
+    def clearance(self, states: Floats) -> Floats:
+        return np.full(states.shape[:-1], np.inf)
 
     def linearize(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
         m = controls.shape[-1]
@@ -72,6 +87,14 @@ class ControlProblem:
     wind: bool
     limit: Box | None
     integrator: Integrator
+
+    @cached_property
+    def limits(self) -> tuple[Floats, Floats]:
+        """(m,) least and largest controls; infinite without a limit."""
+        if self.limit is None:
+            free = np.full(self.system.control_box.dimension, np.inf)
+            return -free, free
+        return self.limit.lower, self.limit.upper
 
     def of(self, members: Ints) -> ControlProblem:
         """The problems of some members only."""

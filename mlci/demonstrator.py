@@ -25,6 +25,7 @@ from mlci.systems import System
 
 _DRAWS = 10_000  # attempts to find a safe state before the start box counts as unsafe
 _TIE = 1e-9  # share of a cost: those that differ by less are equal
+_RISE = 4.0  # a rate between two samples is at most so many times that of the first
 _POINTS_BETWEEN = 10  # points between two samples at which the truth is looked for
 
 
@@ -249,9 +250,14 @@ def enters(system: System, truth: Regions, states: Floats, controls: Floats, dt:
         controls: (B, K, m) controls that were applied.
         dt: time between samples [s].
     """
-    on_lines = np.any(truth.violated_by(states), axis=-1)
-    motion = rollout(system, states[:, :-1], controls[:, :, None], dt, _POINTS_BETWEEN + 1)
-    return np.asarray(on_lines | np.any(truth.signed_distance(motion) < 0, axis=(1, 2)))
+    entered: Bools = np.any(truth.violated_by(states), axis=-1)
+    before = states[:, :-1]
+    reach = _RISE * dt * np.linalg.norm(system.dynamics(before, controls), axis=-1)
+    path, sample = np.nonzero(truth.signed_distance(before) < reach)
+    near, held = before[path, sample], controls[path, sample][:, None]
+    motion = rollout(system, near, held, dt, _POINTS_BETWEEN + 1)
+    entered[path[np.any(truth.signed_distance(motion) < 0, axis=-1)]] = True
+    return entered
 
 
 def _draw_safe(

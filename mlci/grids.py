@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.spaces import Box, Floats, Ints, StateSpace, middle_and_half
+from mlci.compiled import compiled
+from mlci.spaces import Bools, Box, Floats, Ints, StateSpace, middle_and_half
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ class Grid:
         object.__setattr__(self, "shape", shape)
         object.__setattr__(self, "offset", offset)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """S, the number of cells."""
         return int(np.prod(self.shape))
@@ -148,56 +149,96 @@ class Grid:
             (..., *values.shape[1:]), linear between centres, extrapolated linearly over the half
             cell between the outermost centres and the bounds.
         """
-        corners, fractions = self._surround(values, states)
-        tail = (1,) * (values.ndim - 1)
-        for fraction in fractions:
-            share = np.reshape(fraction, (*fraction.shape, *tail))
-            corners = corners[0] + share * (corners[1] - corners[0])
-        return corners
+        columns = np.ascontiguousarray(values, dtype=float).reshape(self.size, -1)
+        between = self._between(columns, np.asarray(states), _VALUE)
+        return between.reshape((*np.shape(states)[:-1], *values.shape[1:]))
 
     def slope(self, values: Floats, states: ArrayLike) -> Floats:
         """Exact gradient (..., n) of `interpolate` for values (S,); 0 beyond the bounds."""
-        corners, fractions = self._surround(values, states)
-        slopes = []
-        for d in range(len(self.shape)):
-            part = corners
-            for axis in range(len(self.shape)):
-                rise = part[1] - part[0]
-                part = rise / self.widths[d] if axis == d else part[0] + fractions[axis] * rise
-            slopes.append(part)
         states, bounds = np.asarray(states), self.space.bounds
+        columns = np.ascontiguousarray(values, dtype=float)[:, None]
+        slopes = [
+            self._between(columns, states, d).reshape(states.shape[:-1]) / width
+            for d, width in enumerate(self.widths)
+        ]
         within = (states >= bounds.lower) & (states <= bounds.upper) | self.space.periodic
         return np.where(within, np.stack(slopes, axis=-1), 0.0)
 
-    def _surround(self, values: Floats, states: ArrayLike) -> tuple[Floats, list[Floats]]:
-        """Values at the centres around states, and the place of the states among them.
-
-        Returns (2, ..., 2, *batch, ...) values, lower and upper centre along each dimension, and
-        for each dimension how far (*batch) a state is above the lower centre, in cells.
-        """
-        states, n = np.asarray(states), len(self.shape)
-        node: Ints = np.zeros((), dtype=np.int64)
-        fractions = []
-        # One dimension after the other: numpy is slow along an axis as short as that of dimensions.
-        for d, count in enumerate(self.shape):
-            position = (states[..., d] - self._lower[d]) / self.widths[d] - 0.5
-            if not self.space.periodic[d]:
-                position = np.minimum(np.maximum(position, -0.5), count - 0.5)
-            low = np.floor(position)
-            if not self.space.periodic[d]:
-                low = np.minimum(np.maximum(low, 0.0), max(count - 2.0, 0.0))
-            fractions.append(position - low)
-            below = low.astype(np.int64)
-            if self.space.periodic[d]:
-                below %= count
-            above = np.where(below + 1 == count, 0, below + 1)
-            ends = np.stack([below, above]) * self._strides[d]
-            along = (2 if axis == d else 1 for axis in range(n))
-            node = node + ends.reshape(*along, *low.shape)
-        # A state that is not a number belongs to no cell: any will do, as its fraction is nan.
-        return values.take(node, axis=0, mode="clip"), fractions
+    def _between(self, columns: Floats, states: Floats, along: int) -> Floats:
+        """`_multilinear` (B, C) of values (S, C) at all of states (..., n)."""
+        flat = np.asarray(states, dtype=float).reshape(-1, len(self.shape))
+        periodic = self.space.periodic
+        return _multilinear(columns, flat, self._lower, self.widths, self._counts, periodic, along)
 
     @cached_property
-    def _strides(self) -> Ints:
-        """(n,) how many cells further the next one along a dimension is."""
-        return np.append(np.cumprod(self.shape[::-1])[-2::-1], 1).astype(np.int64)
+    def _counts(self) -> Ints:
+        """(n,) number of cells in each dimension."""
+        return np.array(self.shape)
+
+
+_VALUE = -1  # in place of a dimension along which `_multilinear` takes the rise
+
+
+@compiled(
+    "f8[:, ::1](Array(f8, 2, 'C', readonly=True), Array(f8, 2, 'A', readonly=True), "
+    "Array(f8, 1, 'C', readonly=True), Array(f8, 1, 'C', readonly=True), i8[::1], "
+    "Array(b1, 1, 'C', readonly=True), i8)"
+)
+def _multilinear(
+    values: Floats,
+    states: Floats,
+    lower: Floats,
+    widths: Floats,
+    shape: Ints,
+    periodic: Bools,
+    along: int,
+) -> Floats:
+    """Interpolated values, or their rise (B, C) by one cell along a dimension.
+
+    Args:
+        values: (S, C) at the cell centres.
+        states: (B, n), not wrapped.
+        lower: (n,) lower corner of the first cell.
+        widths: (n,) of a cell.
+        shape: (n,) cells.
+        periodic: (n,) which dimensions wrap.
+        along: the dimension of the rise, or `_VALUE`.
+    """
+    n, corners = len(shape), 2 ** len(shape)
+    result = np.empty((len(states), values.shape[1]))
+    share, cell, part = np.empty(n), np.zeros(corners, np.int64), np.empty(corners)
+    for b in range(len(states)):
+        # Each dimension doubles the centres around the state; the first becomes the outermost.
+        size, stride = 1, 1
+        for d in range(n - 1, -1, -1):
+            cells = shape[d]
+            place = (states[b, d] - lower[d]) / widths[d] - 0.5
+            if periodic[d]:
+                low = np.floor(place)
+            else:
+                place = -0.5 if place < -0.5 else place
+                place = cells - 0.5 if place > cells - 0.5 else place
+                low = np.floor(place)
+                low = cells - 2.0 if low > cells - 2.0 else low
+                low = 0.0 if low < 0.0 else low
+            share[d] = place - low
+            if low < 0.0 or low >= cells:
+                low %= cells
+            # A state that is not a number belongs to no cell: any will do, as its share is nan.
+            below = np.int64(low) if np.isfinite(low) else 0
+            above = below + 1 if below + 1 < cells else 0
+            for i in range(size):
+                first = cell[i] if d < n - 1 else 0
+                cell[i], cell[size + i] = first + below * stride, first + above * stride
+            size, stride = 2 * size, cells * stride
+        for c in range(values.shape[1]):
+            for i in range(corners):
+                part[i] = values[cell[i], c]
+            size = corners
+            for d in range(n):
+                size //= 2
+                for i in range(size):
+                    rise = part[size + i] - part[i]
+                    part[i] = rise if d == along else part[i] + share[d] * rise
+            result[b, c] = part[0]
+    return result

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mlci.compiled import compiled
 from mlci.control_problem import (
     ControlFilter,
     ControlProblem,
@@ -31,6 +32,7 @@ _STEP_SIZES: Floats = 0.5 ** np.arange(8.0)
 # Damping, as multiples of the running cost's own curvature. The floor keeps Q_uu invertible where
 # the filter overrules the control, which then has no effect at all.
 _FLOOR, _FIRST, _LARGEST, _FACTOR = 1e-9, 1e-2, 1e8, 2.0
+_ROUNDING = 1e-9  # of a clearance that counts as none
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,19 +165,88 @@ def _roll_out(
 
     The arrays of the result have an axis L before B.
     """
-    scale, shape = sizes[:, None, None], (len(sizes), *problem.starts.shape)
-    states = np.empty((len(shift) + 1, *shape))
-    wanted = np.empty((len(shift), *shape[:2], shift.shape[-1]))
-    applied = np.empty_like(wanted)
-    states[0], step = problem.starts, problem.integrator.step
-    for k in range(len(shift)):
-        reaction = (gain[k] @ (states[k] - around.states[k])[..., None])[..., 0]
-        wanted[k] = around.wanted[k] + scale * shift[k] + reaction
-        if problem.limit is not None:
-            wanted[k] = np.clip(wanted[k], problem.limit.lower, problem.limit.upper)
-        applied[k] = problem.safety_filter.apply(states[k], wanted[k])
-        states[k + 1] = step(problem.system, states[k], applied[k], problem.dt)
+    steps, members, m = shift.shape
+    count, n = len(sizes) * members, problem.starts.shape[1]
+    states, wanted = _columns_apart(steps + 1, count, n), _columns_apart(steps, count, m)
+    applied, clearance = _columns_apart(steps, count, m), np.zeros(count)
+    states[0] = np.tile(problem.starts, (len(sizes), 1))
+    for k in range(steps):
+        _set_controls(
+            *(around.states[k], around.wanted[k], shift[k], gain[k], sizes, states[k]),
+            *(*problem.limits, wanted[k]),
+        )
+        _advance(problem, states[k], wanted[k], applied[k], states[k + 1], clearance)
+    states, wanted, applied = (
+        each.reshape(len(each), len(sizes), members, -1) for each in (states, wanted, applied)
+    )
     return Paths(states, wanted, applied, total_cost(problem, states, applied))
+
+
+def _columns_apart(steps: int, count: int, dimension: int) -> Floats:
+    """An array (K, N, d) whose columns are contiguous: numpy is slow along so short an axis."""
+    return np.empty((steps, dimension, count)).transpose(0, 2, 1)
+
+
+def _advance(
+    problem: ControlProblem,
+    states: Floats,
+    wanted: Floats,
+    applied: Floats,
+    ahead: Floats,
+    clearance: Floats,
+) -> None:
+    """Fill applied controls (N, m) and the states (N, n) ahead to which they lead.
+
+    The filter is asked where the clearance (N,) is used up, by how far states may move before it
+    could act, and renews it.
+    """
+    system, dt, step = problem.system, problem.dt, problem.integrator.step
+    applied[:], ahead[:] = wanted, step(system, states, wanted, dt)
+    moves = ahead - states
+    clearance -= np.sqrt(np.einsum("bi,bi->b", moves, moves))
+    near = np.flatnonzero(~(clearance > _ROUNDING))
+    if not len(near):
+        return
+    here, control, there = states[near], wanted[near], ahead[near]
+    filtered = problem.safety_filter.apply(here, control, there)
+    changed = (filtered != control).any(axis=-1)
+    if changed.any():
+        there[changed] = step(system, here[changed], filtered[changed], dt)
+        applied[near], ahead[near] = filtered, there
+    clearance[near] = problem.safety_filter.clearance(there)
+
+
+# numba's types of arrays that are only read, in any layout, by their number of axes.
+_R1, _R2, _R3 = (f"Array(f8, {axes}, 'A', readonly=True)" for axes in (1, 2, 3))
+
+
+@compiled(f"void({_R2}, {_R2}, {_R2}, {_R3}, {_R1}, {_R2}, {_R1}, {_R1}, f8[:, :])")
+def _set_controls(
+    around: Floats,
+    planned: Floats,
+    shift: Floats,
+    gain: Floats,
+    sizes: Floats,
+    states: Floats,
+    lower: Floats,
+    upper: Floats,
+    wanted: Floats,
+) -> None:
+    """Set wanted controls (L * B, m) of one stage at states (L * B, n), clipped to a range.
+
+    Around the states (B, n) of a path with planned controls (B, m) they differ from those by
+    sizes (L,) times the shift (B, m), and by the gain (B, m, n) times the difference of the states.
+    """
+    members, m = planned.shape
+    for i in range(len(states)):
+        b, size = i % members, sizes[i // members]
+        for j in range(m):
+            reaction = 0.0
+            for d in range(states.shape[1]):
+                reaction += gain[b, j, d] * (states[i, d] - around[b, d])
+            control = planned[b, j] + size * shift[b, j] + reaction
+            control = lower[j] if control < lower[j] else control
+            wanted[i, j] = upper[j] if control > upper[j] else control
 
 
 def _adapt(damping: Floats, change: Floats, members: Ints, better: Bools) -> None:

@@ -22,6 +22,7 @@ where that is at most 2 cells, and grows with its number of cells.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -85,15 +86,31 @@ class SafeSet:
         """The derivative (..., n) of `value` itself, which jumps between the cell centres."""
         return self.grid.slope(self.values, states)
 
+    @cached_property
+    def steepness(self) -> float:
+        """No two states differ in `value` by more than this times their Euclidean distance."""
+        values, steepest = self.values.reshape(self.grid.shape), []
+        for d, width in enumerate(self.grid.widths):
+            seam = np.take(values, [0 if self.grid.space.periodic[d] else -1], axis=d)
+            steepest.append(np.max(np.abs(np.diff(values, axis=d, append=seam))) / width)
+        return float(np.linalg.norm(steepest))
+
     def contains(self, states: ArrayLike, margin: float = 0.0) -> Bools:
         """Whether V >= margin (...,) at states (..., n), equation (10)."""
         return np.asarray(self.value(states) >= margin)
 
     def safe_control(self, system: System, states: Floats) -> Floats:
-        """u* (..., m) = argmax over the control box of grad V . h at states (..., n)."""
-        vertices, gradient = system.control_box.vertices(), self.gradient(states)
-        rates = [np.sum(gradient * system.dynamics(states, vertex), axis=-1) for vertex in vertices]
-        return vertices[np.argmax(rates, axis=0)]
+        """u* (..., m) = argmax over the control box of grad V . h at states (..., n).
+
+        The dynamics are affine in the control, so that each control's part is at the end of its
+        range to which grad V . h rises.
+        """
+        lower, upper = system.control_box.lower, system.control_box.upper
+        one_moved = np.where(np.eye(len(lower), dtype=bool), upper, lower)  # one control at a time
+        base = system.dynamics(states, lower)
+        rates = np.array([system.dynamics(states, corner) - base for corner in one_moved])
+        rises = np.einsum("...i,j...i->...j", self.gradient(states), rates)
+        return np.where(rises > 0, upper, lower)
 
 
 def solve_safe_set(

@@ -1,26 +1,31 @@
 """The Riccati recursion of `ilqr`: how the controls of a path should change, and with the state.
 
-Costs are taken as quadratic and motions as linear around a path, in z = (x, u). With the running
-cost's slope L_z and curvature L_zz, and F = [dx'/dx, dx'/du],
+Costs are taken as quadratic and motions as linear around a path. With a 1 in front of the state, so
+that slopes are a row of curvatures, and z = (1, x, u), w = (1, x, v), where a filter makes v of u,
 
-    Q_z = L_z + F' V_x,    Q_zz = L_zz + F' V_xx F.
+    Q = G' (C + A' V A) G,    V = T' Q T
 
-L_zz is G' C G with G = d(x, v)/dz, which leaves out the filter's own curvature, and where C is the
-Hessian of -r in (x, v) with negative eigenvalues taken as 0. The model of the cost is then convex
-whatever the reward, so every step leads downhill if it is short; where -r is not convex, in the
-control or the state, it is one of the first order only. Terms of second order in the motion are
-left out as well, so the fixed points are those of the cost itself.
+are the cost to go by z, and by (1, x) under the control that is best by Q: T maps (1, x) to z. The
+motion from w to the next (1, x) is A, the running cost is C, and G = dw/dz, which leaves out the
+filter's own curvature. C holds the Hessian of -r with negative eigenvalues taken as 0. The model of
+the cost is then convex whatever the reward, so every step leads downhill if it is short; where -r
+is not convex, in the control or the state, it is one of the first order only. Terms of second order
+in the motion are left out as well, so the fixed points are those of the cost itself.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from mlci.compiled import compiled
 from mlci.control_problem import ControlProblem, Paths, terminal_excess
-from mlci.spaces import Box, Floats
+from mlci.spaces import Floats
 
 # Curvature of the running cost that damping is a multiple of, where the reward has none of its own.
 _EFFORT = 2.0
+_SWEEPS = 10  # of rotations over a matrix of controls; after five it is diagonal but for rounding
+# numba's types of arrays that are only read, in any layout, by their number of axes.
+_R1, _R2, _R3, _R4 = (f"Array(f8, {axes}, 'A', readonly=True)" for axes in (1, 2, 3, 4))
 
 
 def feedback(problem: ControlProblem, paths: Paths, damping: Floats) -> tuple[Floats, Floats]:
@@ -34,65 +39,207 @@ def feedback(problem: ControlProblem, paths: Paths, damping: Floats) -> tuple[Fl
         damping: (B,) ridge of Q_uu, in multiples of the largest curvature by a control along the
             path.
     """
-    n = paths.states.shape[-1]
-    step, through = _motion(problem, paths)
-    slope, curvature, scale = _running_cost(problem, paths, through)
-    ridge = problem.dt * scale * damping
-    excess, sides = terminal_excess(problem, paths.states[-1])
-    value_x = 2 * problem.goal_weight * sides * excess
-    value_xx = 2 * problem.goal_weight * sides[..., None] * np.eye(n)
-    shift, gain = np.empty_like(paths.wanted), np.empty((*paths.wanted.shape, n))
-    for k in reversed(range(len(shift))):
-        q_z = slope[k] + (step[k].mT @ value_x[..., None])[..., 0]
-        q_zz = curvature[k] + step[k].mT @ value_xx @ step[k]
-        q_uu, q_ux = q_zz[:, n:, n:], q_zz[:, n:, :n]
-        free = _free(problem.limit, paths.wanted[k], q_z[:, n:])[..., None]
-        held = (1 - free) * np.eye(free.shape[1])
-        inverse = _inverses(free * q_uu * free.mT + held, ridge)
-        shift[k] = -(inverse @ (free * q_z[:, n:, None]))[..., 0]
-        gain[k] = -(inverse @ (free * q_ux))
-        # The form that stays exact for gains of a damped Q_uu.
-        turn = gain[k].mT
-        value_x = q_z[:, :n] + (turn @ (q_uu @ shift[k][..., None] + q_z[:, n:, None]))[..., 0]
-        value_x += (q_ux.mT @ shift[k][..., None])[..., 0]
-        value_xx = q_zz[:, :n, :n] + turn @ (q_uu @ gain[k] + q_ux) + q_ux.mT @ gain[k]
-        value_xx = (value_xx + value_xx.mT) / 2
-    return shift, gain
-
-
-def _motion(problem: ControlProblem, paths: Paths) -> tuple[Floats, Floats]:
-    """F (K, B, n, n + m), and dv/dz (K, B, m, n + m)."""
-    states, dt = paths.states[:-1], problem.dt
-    n = states.shape[-1]
-    through = np.concatenate(problem.safety_filter.linearize(states, paths.wanted), axis=-1)
-    jacobians = problem.integrator.rate_jacobians
-    drift, push = jacobians(problem.system, states, paths.applied, dt)
-    step = dt * (push @ through)
-    step[..., :n] += dt * drift + np.eye(n)
-    return step, through
-
-
-def _running_cost(
-    problem: ControlProblem, paths: Paths, through: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """L_z (K, B, n + m), L_zz (K, B, n + m, n + m), and the largest curvature by a control (B,)."""
-    n = paths.states.shape[-1]
-    gradient, hessian = problem.system.reward_derivatives(paths.states[:-1], paths.applied)
+    states, system, dt = paths.states[:-1], problem.system, problem.dt
+    n, batch = states.shape[-1], states.shape[:-1]
+    gradient, hessian = system.reward_derivatives(states, paths.applied)
     if not any(hessian.strides[:-2]):  # the same everywhere
         hessian = hessian[:1, :1]
-    gradient, hessian = -gradient, _convex(-hessian)
-    slope = (through.mT @ gradient[..., n:, None])[..., 0]
-    slope[..., :n] += gradient[..., :n]
-    by_controls = hessian[..., n:, n:]
-    curvature = through.mT @ by_controls @ through
-    if hessian[..., :n].any():  # few rewards tell states apart
-        mixed = hessian[..., :n, n:] @ through
-        curvature[..., :n, :] += mixed
-        curvature[..., :, :n] += mixed.mT
-        curvature[..., :n, :n] += hessian[..., :n, :n]
-    largest = np.broadcast_to(np.max(np.abs(by_controls), axis=(-2, -1)), slope.shape[:2])
-    scale = np.max(largest, axis=0)
-    return problem.dt * slope, problem.dt * curvature, np.where(scale > 0, scale, _EFFORT)
+    curvature = _convex(-hessian)
+    largest = np.max(np.abs(curvature[..., n:, n:]), axis=(-2, -1))
+    scale = np.max(np.broadcast_to(largest, batch), axis=0)
+    expansion = (
+        *problem.integrator.rate_jacobians(system, states, paths.applied, dt),
+        *problem.safety_filter.linearize(states, paths.wanted),
+        -gradient,
+        np.broadcast_to(curvature, (*batch, *curvature.shape[-2:])),
+    )
+    excess, sides = terminal_excess(problem, paths.states[-1])
+    value = np.zeros((batch[1], 1 + n, 1 + n))
+    value[:, 0, 1:] = value[:, 1:, 0] = 2 * problem.goal_weight * sides * excess
+    value[:, 1:, 1:] = 2 * problem.goal_weight * sides[..., None] * np.eye(n)
+    ridge = dt * np.where(scale > 0, scale, _EFFORT) * damping
+    parts = (np.asarray(part, dtype=float) for part in expansion)
+    response = _backwards(*parts, value, paths.wanted, *problem.limits, ridge, dt)
+    return response[..., 0], response[..., 1:]
+
+
+@compiled(
+    f"f8[:, :, :, ::1]({_R4}, {_R4}, {_R4}, {_R4}, {_R3}, {_R4}, f8[:, :, ::1], {_R3}, {_R1}, "
+    f"{_R1}, f8[::1], f8)"
+)
+def _backwards(
+    drift: Floats,
+    push: Floats,
+    by_state: Floats,
+    by_control: Floats,
+    slope: Floats,
+    curvature: Floats,
+    value: Floats,
+    wanted: Floats,
+    lower: Floats,
+    upper: Floats,
+    ridge: Floats,
+    dt: float,
+) -> Floats:
+    """The response (K, B, m, 1 + n) of the control to (1, x), the last rows of every T.
+
+    Expanded around wanted controls (K, B, m) are the rate of the state, with the derivatives drift
+    (K, B, n, n) and push (K, B, n, m); the applied control, by_state (K, B, m, n) and by_control
+    (K, B, m, m); and the running cost [1/s], slope (K, B, n + m) and curvature (K, B, n + m,
+    n + m). V (B, 1 + n, 1 + n) of the last state is overwritten. Controls are from lower (m,) to
+    upper (m,), and ridge (B,) is added to the eigenvalues of Q_uu.
+    """
+    steps, members, m = wanted.shape
+    s = value.shape[1]
+    d = s + m
+    response = np.empty((steps, members, m, s))
+    cost, q, room = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
+    motion, through, of_controls = np.eye(s, d), np.zeros((m, d)), np.empty((4, m, m))
+    for k in range(steps - 1, -1, -1):
+        for b in range(members):
+            cost[0, 0] = 0.0
+            for i in range(d - 1):
+                cost[0, 1 + i] = cost[1 + i, 0] = dt * slope[k, b, i]
+                for j in range(d - 1):
+                    cost[1 + i, 1 + j] = dt * curvature[k, b, i, j]
+            _join(drift[k, b], push[k, b], dt, motion[1:, 1:])
+            _join(by_state[k, b], by_control[k, b], 1.0, through[:, 1:])
+            for i in range(1, s):
+                motion[i, i] += 1.0
+            _add_transformed(value[b], motion, room, cost)
+            _substitute(through, cost, room, q)
+            _respond(q, wanted[k, b], lower, upper, ridge[b], of_controls, response[k, b])
+            _substitute(response[k, b], q, room, value[b])
+    return response
+
+
+@compiled(f"void({_R2}, {_R2}, f8, f8[:, :])")
+def _join(left: Floats, right: Floats, factor: float, result: Floats) -> None:
+    """The result (r, a + b) is a factor times [left, right], (r, a) and (r, b)."""
+    for i in range(len(left)):
+        for j in range(left.shape[1]):
+            result[i, j] = factor * left[i, j]
+        for j in range(right.shape[1]):
+            result[i, left.shape[1] + j] = factor * right[i, j]
+
+
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _add_transformed(value: Floats, motion: Floats, room: Floats, cost: Floats) -> None:
+    """Add A' V A (d, d) of a symmetric V (s, s) and a motion A (s, d) to a cost (d, d)."""
+    s, d = motion.shape
+    for i in range(s):
+        for j in range(d):
+            total = 0.0
+            for r in range(s):
+                total += value[i, r] * motion[r, j]
+            room[i, j] = total
+    for i in range(d):
+        for j in range(i + 1):
+            total = cost[i, j]
+            for r in range(s):
+                total += motion[r, i] * room[r, j]
+            cost[i, j] = cost[j, i] = total
+
+
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _substitute(rows: Floats, matrix: Floats, room: Floats, result: Floats) -> None:
+    """A symmetric form (s + m, s + m) in (y, v) as one (d, d) in z, of which y is the start.
+
+    With v = rows z, and rows (m, d): B' M B where B = [1; rows].
+    """
+    m, d = rows.shape
+    s = len(matrix) - m
+    for r in range(m):
+        for j in range(d):
+            total = matrix[s + r, j] if j < s else 0.0
+            for t in range(m):
+                total += matrix[s + r, s + t] * rows[t, j]
+            room[r, j] = total
+    for i in range(d):
+        for j in range(i + 1):
+            total = 0.0
+            if i < s:
+                total = matrix[i, j]
+                for r in range(m):
+                    total += matrix[i, s + r] * rows[r, j]
+            for r in range(m):
+                total += rows[r, i] * room[r, j]
+            result[i, j] = result[j, i] = total
+
+
+@compiled(f"void(f8[:, ::1], {_R1}, {_R1}, {_R1}, f8, f8[:, :, ::1], f8[:, ::1])")
+def _respond(
+    q: Floats,
+    wanted: Floats,
+    lower: Floats,
+    upper: Floats,
+    ridge: float,
+    room: Floats,
+    response: Floats,
+) -> None:
+    """The response (m, 1 + n) is -(Q_uu + ridge 1)^-1 Q_uy, where y = (1, x).
+
+    Negative eigenvalues of Q_uu count as 0. A control (m,) at an end of its range from which a
+    lower cost would lead outside stays where it is, and the others take the Newton step without it
+    (Tassa, Mansard and Todorov 2014, "Control-limited differential dynamic programming").
+    """
+    m, s = response.shape
+    q_uu, vectors, inverse, part = room[0], room[1], room[2, 0], room[3, 0]
+    for i in range(m):
+        for j in range(m):
+            q_uu[i, j] = q[s + i, s + j]
+    for i in range(m):
+        slope = q[s + i, 0]
+        held = (wanted[i] <= lower[i] and slope > 0) or (wanted[i] >= upper[i] and slope < 0)
+        for j in range(s):
+            response[i, j] = 0.0 if held else -q[s + i, j]
+        for j in range(m):
+            if held:
+                q_uu[i, j] = q_uu[j, i] = 0.0
+    _diagonalize(q_uu, vectors)
+    for e in range(m):
+        inverse[e] = 1 / (ridge + (q_uu[e, e] if q_uu[e, e] > 0 else 0.0))
+    for j in range(s):
+        for e in range(m):
+            part[e] = 0.0
+            for i in range(m):
+                part[e] += vectors[i, e] * response[i, j] * inverse[e]
+        for i in range(m):
+            response[i, j] = 0.0
+            for e in range(m):
+                response[i, j] += vectors[i, e] * part[e]
+
+
+@compiled("void(f8[:, ::1], f8[:, ::1])")
+def _diagonalize(matrix: Floats, vectors: Floats) -> None:
+    """Turn a symmetric matrix (m, m) into its eigenvalues; the columns of `vectors` are theirs.
+
+    By Jacobi's rotations, each of which makes an entry beside the diagonal 0 (Golub and Van Loan,
+    "Matrix Computations", section 8.5).
+    """
+    m = len(matrix)
+    for p in range(m):
+        for r in range(m):
+            vectors[p, r] = 1.0 if p == r else 0.0
+    for _ in range(_SWEEPS if m > 1 else 0):
+        for p in range(m - 1):
+            for r in range(p + 1, m):
+                if matrix[p, r] == 0.0:
+                    continue
+                ratio = (matrix[r, r] - matrix[p, p]) / (2 * matrix[p, r])
+                tangent = 1 / (abs(ratio) + np.sqrt(ratio * ratio + 1))
+                tangent = -tangent if ratio < 0 else tangent
+                cosine = 1 / np.sqrt(tangent * tangent + 1)
+                sine = tangent * cosine
+                for i in range(m):
+                    a, b = matrix[i, p], matrix[i, r]
+                    matrix[i, p], matrix[i, r] = cosine * a - sine * b, sine * a + cosine * b
+                    a, b = vectors[i, p], vectors[i, r]
+                    vectors[i, p], vectors[i, r] = cosine * a - sine * b, sine * a + cosine * b
+                for i in range(m):
+                    a, b = matrix[p, i], matrix[r, i]
+                    matrix[p, i], matrix[r, i] = cosine * a - sine * b, sine * a + cosine * b
+                matrix[p, r] = matrix[r, p] = 0.0
 
 
 def _convex(matrices: Floats) -> Floats:
@@ -106,22 +253,3 @@ def _convex(matrices: Floats) -> Floats:
         values, vectors = np.linalg.eigh(matrices[doubtful])
         matrices[doubtful] = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.mT
     return matrices
-
-
-def _free(limit: Box | None, wanted: Floats, slope: Floats) -> Floats:
-    """(B, m) 0 for a control at an end of its range from which a lower cost would lead outside.
-
-    Such controls stay where they are, and the others take the Newton step without them (Tassa,
-    Mansard and Todorov 2014, "Control-limited differential dynamic programming").
-    """
-    if limit is None:
-        return np.ones(wanted.shape)
-    outward = (wanted <= limit.lower) & (slope > 0) | (wanted >= limit.upper) & (slope < 0)
-    return np.where(outward, 0.0, 1.0)
-
-
-def _inverses(matrices: Floats, ridge: Floats) -> Floats:
-    """(Q + ridge 1)^-1 (B, m, m) of symmetric matrices, negative eigenvalues taken as 0."""
-    finite = np.asarray(np.all(np.isfinite(matrices), axis=(1, 2)))
-    values, vectors = np.linalg.eigh(np.where(finite[:, None, None], matrices, 0.0))
-    return (vectors / (np.maximum(values, 0.0) + ridge[:, None])[:, None, :]) @ vectors.mT

@@ -6,14 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mlci.control_problem import ControlFilter
 from mlci.reachability import SafeSet
 from mlci.simulate import EULER, Integrator
 from mlci.spaces import Floats
 from mlci.systems import System
 
+_FLAT = 1e-9  # steepness below which V counts as constant
+
 
 @dataclass(frozen=True, eq=False)
-class SafetyFilter:
+class SafetyFilter(ControlFilter):
     """Replaces a control by u* when the state after one more hold would not be safe.
 
     With z = (V(x') - margin) / width, where x' is the state one step later, the applied control is
@@ -50,15 +53,25 @@ class SafetyFilter:
                 f"{self.width}"
             )
 
-    def apply(self, states: Floats, controls: Floats) -> Floats:
-        """Controls (..., m) that are applied at states (..., n) for nominal controls (..., m)."""
-        share, _ = self._share(states, controls)
+    def apply(self, states: Floats, controls: Floats, ahead: Floats | None = None) -> Floats:
+        """Controls (..., m) that are applied at states (..., n) for nominal controls (..., m).
+
+        To what states (..., n) those lead in a hold may be known: `ahead`.
+        """
+        if ahead is None:
+            ahead = self.integrator.step(self.system, states, controls, self.dt)
+        share, _ = self._share(ahead)
         near = share < 1
         applied = np.array(controls, dtype=float)
         if near.any():
             safe = self.safe_set.safe_control(self.system, states[near])
             applied[near] = safe + share[near][:, None] * (applied[near] - safe)
         return applied
+
+    def clearance(self, states: Floats) -> Floats:
+        """How far (...) states (..., n) may move, Euclidean, before it could change a control."""
+        room = self.safe_set.value(states) - (self.margin + self.width)
+        return room / max(self.safe_set.steepness, _FLAT)
 
     def linearize(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
         """Derivatives of the applied control.
@@ -72,15 +85,15 @@ class SafetyFilter:
         Returns:
             By the state (..., m, n), and by the nominal control (..., m, m).
         """
-        share, slope = self._share(states, controls)
+        ahead = self.integrator.step(self.system, states, controls, self.dt)
+        share, slope = self._share(ahead)
         batch, n, m = states.shape[:-1], states.shape[-1], controls.shape[-1]
         by_state = np.zeros((*batch, m, n))
         by_control = share[..., None, None] * np.eye(m)
         blend = slope > 0
         if blend.any():
             x, u = states[blend], controls[blend]
-            ahead = self.integrator.step(self.system, x, u, self.dt)
-            gradient = slope[blend][:, None] * self.safe_set.slope(ahead)
+            gradient = slope[blend][:, None] * self.safe_set.slope(ahead[blend])
             drift, push = self.integrator.rate_jacobians(self.system, x, u, self.dt)
             by_x = gradient + self.dt * np.einsum("bi,bij->bj", gradient, drift)
             by_u = self.dt * np.einsum("bi,bij->bj", gradient, push)
@@ -89,9 +102,8 @@ class SafetyFilter:
             by_control[blend] += override[:, :, None] * by_u[:, None, :]
         return by_state, by_control
 
-    def _share(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
-        """lambda (...,), and its derivative (...,) by V after the hold."""
-        ahead = self.integrator.step(self.system, states, controls, self.dt)
+    def _share(self, ahead: Floats) -> tuple[Floats, Floats]:
+        """lambda (...,), and its derivative by V (...,), at states (..., n) after the hold."""
         room = self.safe_set.value(ahead) - self.margin
         if self.width == 0:
             return np.where(room >= 0, 1.0, 0.0), np.zeros(room.shape)

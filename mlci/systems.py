@@ -286,7 +286,7 @@ def _stacked(batch: tuple[int, ...], rates: Sequence[ArrayLike]) -> Floats:
     rows = np.empty((len(rates), *batch))
     for d, rate in enumerate(rates):
         rows[d] = rate
-    return np.moveaxis(rows, 0, -1)
+    return rows.transpose(*range(1, rows.ndim), 0)
 
 
 def _require_positive(system: System, *names: str) -> None:

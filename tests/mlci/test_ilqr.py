@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq, lsq_linear
 
+from mlci.control_problem import ControlFilter
 from mlci.grids import Grid
 from mlci.ilqr import optimize
 from mlci.reachability import solve_safe_set
@@ -407,12 +408,12 @@ def test_cost_never_rises_and_no_member_sees_another(safety_filter):
         np.testing.assert_allclose(alone.controls[0], together.controls[b], atol=1e-9)
 
 
-class Saturation:
+class Saturation(ControlFilter):
     """v = 2 tanh((u + tilt . x) / 2): smooth, invertible, and different at every state."""
 
     tilt = np.array([0.8, -0.5])
 
-    def apply(self, states, controls):
+    def apply(self, states, controls, ahead=None):
         return 2 * np.tanh((controls + (states @ self.tilt)[..., None]) / 2)
 
     def linearize(self, states, controls):
@@ -432,10 +433,10 @@ def test_filter_is_part_of_the_optimised_motion():
     np.testing.assert_allclose(bent.states[0], again, atol=1e-12)
 
 
-class Override:
+class Override(ControlFilter):
     """Every control is replaced by 0, as by a hard switch that is never off."""
 
-    def apply(self, states, controls):
+    def apply(self, states, controls, ahead=None):
         return np.zeros_like(controls)
 
     def linearize(self, states, controls):
@@ -449,10 +450,10 @@ def test_filter_that_overrules_everything_leaves_nothing_to_optimise():
     assert np.all(found.costs == found.costs[0])
 
 
-class Broken:
+class Broken(ControlFilter):
     """Passes every control; its derivatives are NaN for paths on the negative side."""
 
-    def apply(self, states, controls):
+    def apply(self, states, controls, ahead=None):
         return controls
 
     def linearize(self, states, controls):
@@ -464,7 +465,7 @@ class Broken:
 class Understated(Override):
     """Passes every control, and claims to pass a thousandth: steps are far too long."""
 
-    def apply(self, states, controls):
+    def apply(self, states, controls, ahead=None):
         return controls
 
     def linearize(self, states, controls):
@@ -481,7 +482,7 @@ def test_damping_grows_until_a_step_succeeds():
 class Fuse(Override):
     """Passes controls up to 1.2, and blows beyond."""
 
-    def apply(self, states, controls):
+    def apply(self, states, controls, ahead=None):
         return np.where(np.abs(controls) > 1.2, np.nan, controls)
 
     def linearize(self, states, controls):
