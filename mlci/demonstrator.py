@@ -250,13 +250,11 @@ def enters(system: System, truth: Regions, states: Floats, controls: Floats, dt:
         controls: (B, K, m) controls that were applied.
         dt: time between samples [s].
     """
-    entered: Bools = np.any(truth.violated_by(states), axis=-1)
-    before = states[:, :-1]
+    before, entered = states[:, :-1], np.asarray(np.any(truth.violated_by(states), axis=-1))
     reach = _RISE * dt * np.linalg.norm(system.dynamics(before, controls), axis=-1)
-    path, sample = np.nonzero(truth.signed_distance(before) < reach)
-    near, held = before[path, sample], controls[path, sample][:, None]
-    motion = rollout(system, near, held, dt, _POINTS_BETWEEN + 1)
-    entered[path[np.any(truth.signed_distance(motion) < 0, axis=-1)]] = True
+    close = np.nonzero(truth.signed_distance(before) < reach)
+    motion = rollout(system, before[close], controls[close][:, None], dt, _POINTS_BETWEEN + 1)
+    entered[close[0][np.any(truth.signed_distance(motion) < 0, axis=-1)]] = True
     return entered
 
 
