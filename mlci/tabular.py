@@ -264,10 +264,12 @@ def discretize(
             if progress is not None:
                 progress(int(cells[-1]) + 1, grid.size)
 
-    if model.states * model.moves <= MOST_KEPT:
-        return replace(model, kept=SingleMoves.joined(list(blocks())))
-    vars(model)["merged"] = merge_moves(blocks())
-    return model
+    if model.states * model.moves > MOST_KEPT:
+        vars(model)["merged"] = merge_moves(blocks())
+        return model
+    full = replace(model, kept=SingleMoves.joined(list(blocks())))
+    vars(full)["substeps"] = model.substeps  # counted once
+    return full
 
 
 def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int:
@@ -278,18 +280,18 @@ def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int
     """
     shortest = dt
     quarter = np.where(grid.space.periodic, grid.space.bounds.widths / 4, np.inf)
-    for first in range(0, grid.size, _PATHS_AT_ONCE):
-        states = grid.centers[first : first + _PATHS_AT_ONCE]
-        for action in actions:
-            speed = system.dynamics(states, action[None, :])
-            by_state, _ = system.jacobians(states, action[None, :])
-            bend = np.max(np.abs(np.einsum("...ij,...j->...i", by_state, speed)), axis=0)
-            with np.errstate(divide="ignore"):
-                shortest = min(
-                    shortest,
-                    float(np.min(np.sqrt(8 * _CHORD_ERROR * grid.widths / bend))),
-                    float(np.min(quarter / np.max(np.abs(speed), axis=0))),
-                )
+    size = max(1, _PATHS_AT_ONCE // len(actions))
+    for first in range(0, grid.size, size):
+        states, controls = grid.centers[first : first + size], actions[:, None, :]
+        speed = system.dynamics(states, controls)
+        by_state, _ = system.jacobians(states, controls)
+        bend = np.max(np.abs(np.einsum("...ij,...j->...i", by_state, speed)), axis=(0, 1))
+        with np.errstate(divide="ignore"):
+            shortest = min(
+                shortest,
+                float(np.min(np.sqrt(8 * _CHORD_ERROR * grid.widths / bend))),
+                float(np.min(quarter / np.max(np.abs(speed), axis=(0, 1)))),
+            )
     return int(np.ceil(dt / shortest - 1e-9))
 
 
