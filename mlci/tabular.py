@@ -280,9 +280,8 @@ def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int
     """
     shortest = dt
     quarter = np.where(grid.space.periodic, grid.space.bounds.widths / 4, np.inf)
-    size = max(1, _PATHS_AT_ONCE // len(actions))
-    for first in range(0, grid.size, size):
-        states, controls = grid.centers[first : first + size], actions[:, None, :]
+    controls, parts = actions[:, None, :], 1 + grid.size * len(actions) // _PATHS_AT_ONCE
+    for states in np.array_split(grid.centers, min(parts, grid.size)):
         speed = system.dynamics(states, controls)
         by_state, _ = system.jacobians(states, controls)
         bend = np.max(np.abs(np.einsum("...ij,...j->...i", by_state, speed)), axis=(0, 1))
