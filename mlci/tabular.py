@@ -39,8 +39,7 @@ _MOVES_AT_ONCE = 1 << 17  # what a step of long work holds beside its result: ab
 _PATHS_AT_ONCE = 1 << 13  # which the second level of cache nearly holds
 MOST_KEPT = 1 << 24  # moves: half a gigabyte
 
-# Called with how many parts of long work are done, and of how many.
-Progress = Callable[[int, int], None]
+Progress = Callable[[int, int], None]  # called with how much is done, and of how much
 
 
 @dataclass(frozen=True, eq=False)
