@@ -112,7 +112,7 @@ __all__ = [
     "write_demonstration",
 ]
 
-__version__ = "0.4.0"
+__version__ = "0.5.0"
 
 
 def __getattr__(name: str) -> Any:
