@@ -88,16 +88,25 @@ class Boxes:
             begins (P+1,), where the labels of each path begin; the labels (E,), rising within a
             path; and of the first chord that meets each, the shares (E,) between which it does.
         """
+        corners = self.lower, self.upper, self.label
         buckets = self.origin, self.scale, self.shape, self.begins, self.boxes
-        found: tuple[Ints, Ints, Floats, Floats] = _hits(
-            starts, steps, tested, self.bounded, (self.lower, self.upper, self.label), buckets
-        )
-        return found
+        paths, m, labels = len(tested), len(self.bounded), int(np.max(self.label, initial=-1)) + 1
+        room = *np.empty((2, m)), *np.empty((3, m), dtype=np.int64), np.full(labels, -1)
+        begins, size = np.zeros(paths + 1, dtype=np.int64), 4 * paths + labels
+        met: Ints = np.empty(size, dtype=np.int32)
+        enters, leaves = np.empty(size), np.empty(size)
+        fixed, done = (starts, steps, tested, self.bounded, corners, buckets, room), 0
+        while (done := _hits(*fixed, done, begins, met, enters, leaves)) < paths:
+            met, enters = np.append(met, met), np.append(enters, enters)
+            leaves = np.append(leaves, leaves)
+        count = begins[-1]
+        return begins, met[:count].copy(), enters[:count].copy(), leaves[:count].copy()
 
 
 _BOXES = "Tuple((f8[:,::1], f8[:,::1], i8[::1]))"
 _BUCKETS = "Tuple((f8[::1], f8[::1], i8[::1], i8[::1], i8[::1]))"
-_HITS = "Tuple((i8[::1], i4[::1], f8[::1], f8[::1]))"
+_ROOM = "Tuple((f8[::1], f8[::1], i8[::1], i8[::1], i8[::1], i8[::1]))"
+_FOUND = "i8[::1], i4[::1], f8[::1], f8[::1]"
 
 
 @compiled("UniTuple(f8, 2)(f8[::1], f8[::1], f8[:,::1], f8[:,::1], i8)")
@@ -130,34 +139,34 @@ def _advance(bucket, low, high):  # type: ignore[no-untyped-def]
     return False
 
 
-@compiled(f"{_HITS}(f8[:,:,:], f8[:,:,:], b1[:], i8[::1], {_BOXES}, {_BUCKETS})")
-def _hits(starts, steps, tested, bounded, corners, buckets):  # type: ignore[no-untyped-def]
-    """`Boxes.hits`: for each chord, the boxes in each bucket that it may come through."""
+@compiled(f"i8(f8[:,:,:], f8[:,:,:], b1[:], i8[::1], {_BOXES}, {_BUCKETS}, {_ROOM}, i8, {_FOUND})")
+def _hits(  # type: ignore[no-untyped-def]
+    starts, steps, tested, bounded, corners, buckets, room, done, ends, found, enters, leaves
+):
+    """`Boxes.hits`: for each chord, the boxes in each bucket that it may come through.
+
+    It begins with path number `done`, and returns that of the first path for which there may not be
+    enough room in what is found, so that it can go on from there with more.
+    """
     (lower, upper, label), (origin, scale, shape, begins, boxes) = corners, buckets
-    m, labels = len(bounded), label.max() + 1 if len(label) else 0
-    start, step = np.empty(m), np.empty(m)
-    low, high, bucket = np.empty(m, np.int64), np.empty(m, np.int64), np.empty(m, np.int64)
-    last_path = np.full(labels, -1)  # that met a label
-    ends, size, count = np.zeros(len(tested) + 1, np.int64), 4 * len(tested) + labels, 0
-    found, enters, leaves = np.empty(size, np.int32), np.empty(size), np.empty(size)
-    for path in range(len(tested)):
-        if count + labels > size:
-            size = 2 * size
-            found = np.append(found, np.empty_like(found))
-            enters, leaves = np.append(enters, enters), np.append(leaves, leaves)
+    start, step, low, high, bucket, last_path = room  # the last path that met each label
+    labels, count = len(last_path), ends[done]
+    for path in range(done, len(tested)):
+        if count + labels > len(found):
+            return path
         for chord in range(starts.shape[1] if tested[path] and labels > 0 else 0):
             going = True
-            for d in range(m):
+            for d in range(len(bounded)):
                 start[d], step[d] = starts[path, chord, bounded[d]], steps[path, chord, bounded[d]]
                 end = start[d] + step[d]
-                going &= np.isfinite(end)
-                first = np.floor((min(start[d], end) - origin[d]) * scale[d])
-                last = np.floor((max(start[d], end) - origin[d]) * scale[d])
+                going &= abs(end) < np.inf
+                first = (min(start[d], end) - origin[d]) * scale[d]
+                last = (max(start[d], end) - origin[d]) * scale[d]
                 low[d] = bucket[d] = int(min(max(first, 0.0), shape[d] - 1.0))
                 high[d] = int(min(max(last, 0.0), shape[d] - 1.0))
             while going:
                 number = 0
-                for d in range(m):
+                for d in range(len(bounded)):
                     number = number * shape[d] + bucket[d]
                 for entry in range(begins[number], begins[number + 1]):
                     box = boxes[entry]
@@ -175,4 +184,4 @@ def _hits(starts, steps, tested, bounded, corners, buckets):  # type: ignore[no-
                         count += 1
                 going = _advance(bucket, low, high)
         ends[path + 1] = count
-    return ends, found[:count].copy(), enters[:count].copy(), leaves[:count].copy()
+    return len(tested)
