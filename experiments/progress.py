@@ -10,9 +10,10 @@ import logging
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from tqdm import tqdm
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 _LOG = logging.getLogger(__name__)
 _COMPILES = logging.getLogger("mlci.compiled")
@@ -27,6 +28,8 @@ def begin(step: str) -> None:
 @contextmanager
 def steps_shown() -> Iterator[None]:
     """Show the step that this block is at and the time since it began; nothing off a terminal."""
+    from tqdm import tqdm
+
     with tqdm(bar_format="{desc} [{elapsed}]", leave=False, disable=None) as bar:
         if bar.disable:
             yield

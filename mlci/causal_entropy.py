@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy  # loads scipy.special when it is first used
 from scipy import sparse
-from scipy.special import logsumexp, xlogy
 
 from mlci.flows import fixed_point, reached
 from mlci.spaces import Bools, Floats
@@ -123,7 +123,7 @@ class CausalEntropy:
 
     def _soft_maximum(self, action_values: Floats) -> Floats:
         """V (S,): that of the actions, and 0 at goals."""
-        values = np.asarray(logsumexp(action_values, axis=1))
+        values = np.asarray(scipy.special.logsumexp(action_values, axis=1))
         values[self.table.goals] = 0.0
         return values
 
@@ -149,7 +149,7 @@ class CausalEntropy:
             _require_goals(lasting.table)
         policy = allowed / np.maximum(np.sum(allowed, axis=1, keepdims=True), 1)
         for _ in range(_IMPROVEMENTS):
-            entropy = -np.sum(xlogy(policy, policy), axis=1)
+            entropy = -np.sum(scipy.special.xlogy(policy, policy), axis=1)
             gain = np.sum(policy * self.table.reward, axis=1) + entropy
             before = values[lives]
             values[lives] = fixed_point(lasting._flow(policy), gain)[lives]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import softmax
+import scipy  # loads scipy.special when it is first used
 
 from mlci.spaces import Floats
 from mlci.tabular import TabularModel
@@ -102,7 +102,7 @@ def _noise(model: TabularModel) -> Floats:
         reward = model.move_reward(
             np.repeat(centers, count, axis=0), np.tile(model.actions, (len(centers), 1))
         )
-        probability = softmax(reward.reshape(-1, count), axis=1)
+        probability = scipy.special.softmax(reward.reshape(-1, count), axis=1)
         mean = probability @ model.actions
         total += np.sum(probability @ np.square(model.actions) - np.square(mean), axis=0)
     return np.asarray(total * model.dt / model.grid.size)

@@ -24,8 +24,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # loads scipy.special when it is first used
 from numpy.typing import ArrayLike
-from scipy.special import logsumexp
 
 from mlci.spaces import Bools, Floats, Ints
 
@@ -208,7 +208,7 @@ def posterior(
     with np.errstate(divide="ignore"):
         none = np.where(decided, -np.inf, np.log(prior_none))
         log_weight = np.concatenate([np.log(share) + gain, none], axis=-1)
-    probability = np.exp(log_weight - logsumexp(log_weight, axis=-1, keepdims=True))
+    probability = np.exp(log_weight - scipy.special.logsumexp(log_weight, axis=-1, keepdims=True))
     return probability[..., :-1], probability[..., -1]
 
 
@@ -244,7 +244,9 @@ def log_marginal(
     with np.errstate(divide="ignore"):
         log_prior = np.log(shares)
     none = np.zeros((*gain.shape[:-1], 1))
-    return np.asarray(logsumexp(np.concatenate([gain, none], axis=-1) + log_prior, axis=-1))
+    return np.asarray(
+        scipy.special.logsumexp(np.concatenate([gain, none], axis=-1) + log_prior, axis=-1)
+    )
 
 
 def confidence(prior: float, avoidance: ArrayLike) -> float:

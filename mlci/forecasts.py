@@ -28,9 +28,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # loads scipy.optimize when it is first used: most commands never do
+import scipy  # loads scipy.optimize and scipy.special when they are first used
 from numpy.typing import ArrayLike
-from scipy.special import expit
 
 from mlci.regions import Regions
 from mlci.spaces import Bools, Floats, Ints
@@ -82,7 +81,7 @@ class ForecastCurve:
         """Calibrated alpha (...,), at least 1 - hi."""
         alpha = np.asarray(avoidance, dtype=float)
         parts = np.array([self.intercept, self.of_probability, self.of_gain])
-        crossing = self.ceiling * expit(_features(alpha, self.tasks) @ parts)
+        crossing = self.ceiling * scipy.special.expit(_features(alpha, self.tasks) @ parts)
         return np.where(is_possible(alpha), 1 - crossing, 1.0)
 
 
@@ -192,7 +191,7 @@ def _fit_curve(
 
     def loss(parts: Floats) -> tuple[float, Floats]:
         """Mean of minus the log score, and its gradient by a, b, c and hi."""
-        rise, hi = expit(features @ parts[:3]), parts[3]
+        rise, hi = scipy.special.expit(features @ parts[:3]), parts[3]
         crossing = np.maximum(hi * rise, np.finfo(float).tiny)
         of_pairs = -share * np.log(crossing) - (1 - share) * np.log1p(-crossing)
         slope = (1 - share) / (1 - crossing) - share / crossing

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -282,6 +281,8 @@ class Inference:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the summary, and the map."""
+        import html
+
         return f"<pre>{html.escape(repr(self))}</pre>{_plot().html_image(self.plot())}"
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # loads scipy.special when it is first used
 from numpy.typing import ArrayLike
-from scipy.special import comb
 
 from mlci.evidence import posterior, rank_scores
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
@@ -101,7 +101,9 @@ def top_chances(gains: Floats, good: Bools, top: int) -> Floats:
     last = np.sort(rank, axis=1)[:, [top - 1]]
     before, tied = rank < last, rank == last
     places = top - np.sum(before, axis=1)
-    fitting, all_ways = (comb(np.sum(part, axis=1), places) for part in (tied & good, tied))
+    fitting, all_ways = (
+        scipy.special.comb(np.sum(part, axis=1), places) for part in (tied & good, tied)
+    )
     return np.asarray(np.all(good | ~before, axis=1) * fitting / all_ways)
 
 

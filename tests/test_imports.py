@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
@@ -212,6 +213,14 @@ def test_mlci_is_mathematics_alone(graph: Graph) -> None:
         if is_of(module, ["mlci"]):
             pictures = {"matplotlib"} if module == "mlci.plot" else set()
             assert {name.split(".")[0] for name in imports} <= allowed | pictures, module
+
+
+def test_mlci_loads_late_what_takes_time_and_not_every_use_needs() -> None:
+    late = {"pandas", "numba", "joblib", "matplotlib", "html"}
+    late |= {f"scipy.{part}" for part in ("interpolate", "linalg", "optimize", "special")}
+    code = f"import sys, mlci, mlci.temperature; print(*sys.modules.keys() & {late!r})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
 
 
 def test_rooms_import_those_below(graph: Graph) -> None:

@@ -16,7 +16,6 @@ from experiments.tracking.points import State
 _SWEEP_ONLY = ("only", "limit", "time_limit", "retries", "fail_fast", "mix_sources", "replace")
 
 
-@steps_shown()
 def run_single(tree: dict[str, Any]) -> None:
     """Run the point of a resolved config, unless it is finished; prints its log either way.
 
@@ -36,7 +35,8 @@ def run_single(tree: dict[str, Any]) -> None:
         writable_results(study)
         if point.is_running():
             print(f"another process runs this point, and is waited for: {point.folder}")
-        attempt.run_here(point, settings, print, force=study.sweep.force)
+        with steps_shown():
+            attempt.run_here(point, settings, print, force=study.sweep.force)
         print(f"written: {point.folder}")
 
 

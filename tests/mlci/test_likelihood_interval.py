@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from mlci.likelihood_interval import DROP, likelihood_interval
 
 GRID = np.linspace(-4.0, 4.0, 9)
 Z = 1.959963984540054  # of the normal distribution, 97.5 %
+
+
+def test_the_drop_is_half_the_quantile_of_chi_squared() -> None:
+    assert pytest.approx(chi2.ppf(0.95, 1) / 2, rel=1e-14) == DROP
 
 
 @pytest.mark.parametrize("width", [1.0, 0.1])  # the second is narrower than a step of the grid
