@@ -24,8 +24,7 @@ from mlci.spaces import Floats
 # Curvature of the running cost that damping is a multiple of, where the reward has none of its own.
 _EFFORT = 2.0
 _SWEEPS = 10  # of rotations over a matrix of controls; after five it is diagonal but for rounding
-# numba's types of arrays that are only read, in any layout, by their number of axes.
-_R1, _R2, _R3, _R4 = (f"Array(f8, {axes}, 'A', readonly=True)" for axes in (1, 2, 3, 4))
+_4D = "f8[:, :, :, ::1]"
 
 
 def feedback(problem: ControlProblem, paths: Paths, damping: Floats) -> tuple[Floats, Floats]:
@@ -58,14 +57,20 @@ def feedback(problem: ControlProblem, paths: Paths, damping: Floats) -> tuple[Fl
     value[:, 0, 1:] = value[:, 1:, 0] = 2 * problem.goal_weight * sides * excess
     value[:, 1:, 1:] = 2 * problem.goal_weight * sides[..., None] * np.eye(n)
     ridge = dt * np.where(scale > 0, scale, _EFFORT) * damping
-    parts = (np.asarray(part, dtype=float) for part in expansion)
-    response = _backwards(*parts, value, paths.wanted, *problem.limits, ridge, dt)
+    given = *expansion, paths.wanted, *problem.limits
+    parts = (np.require(part, float, ["C", "W"]) for part in given)
+    m = paths.wanted.shape[-1]
+    d = 1 + n + m
+    motion, through = np.eye(1 + n, d), np.zeros((m, d))
+    room = motion, through, *np.empty((3, d, d)), np.empty((4, m, m))
+    response = np.empty((*batch, m, 1 + n))
+    _backwards(*parts, ridge, dt, value, room, response)
     return response[..., 0], response[..., 1:]
 
 
 @compiled(
-    f"f8[:, :, :, ::1]({_R4}, {_R4}, {_R4}, {_R4}, {_R3}, {_R4}, f8[:, :, ::1], {_R3}, {_R1}, "
-    f"{_R1}, f8[::1], f8)"
+    f"void({_4D}, {_4D}, {_4D}, {_4D}, f8[:, :, ::1], {_4D}, f8[:, :, ::1], f8[::1], f8[::1], "
+    f"f8[::1], f8, f8[:, :, ::1], Tuple(({', '.join(5 * ['f8[:, ::1]'])}, f8[:, :, ::1])), {_4D})"
 )
 def _backwards(
     drift: Floats,
@@ -74,53 +79,47 @@ def _backwards(
     by_control: Floats,
     slope: Floats,
     curvature: Floats,
-    value: Floats,
     wanted: Floats,
     lower: Floats,
     upper: Floats,
     ridge: Floats,
     dt: float,
-) -> Floats:
+    value: Floats,
+    room: tuple[Floats, Floats, Floats, Floats, Floats, Floats],
+    response: Floats,
+) -> None:
     """The response (K, B, m, 1 + n) of the control to (1, x), the last rows of every T.
 
     Expanded around wanted controls (K, B, m) are the rate of the state, with the derivatives drift
     (K, B, n, n) and push (K, B, n, m); the applied control, by_state (K, B, m, n) and by_control
     (K, B, m, m); and the running cost [1/s], slope (K, B, n + m) and curvature (K, B, n + m,
-    n + m). V (B, 1 + n, 1 + n) of the last state is overwritten. Controls are from lower (m,) to
-    upper (m,), and ridge (B,) is added to the eigenvalues of Q_uu.
+    n + m). Controls are from lower (m,) to upper (m,), and ridge (B,) is added to the eigenvalues
+    of Q_uu. V (B, 1 + n, 1 + n) of the last state is overwritten. Of the room, the first row of A
+    and the first column of the last rows of G are given and stay.
     """
-    steps, members, m = wanted.shape
-    s = value.shape[1]
-    d = s + m
-    response = np.empty((steps, members, m, s))
-    cost, q, room = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
-    motion, through, of_controls = np.eye(s, d), np.zeros((m, d)), np.empty((4, m, m))
-    for k in range(steps - 1, -1, -1):
-        for b in range(members):
+    motion, through, cost, q, products, of_controls = room
+    n, m = push.shape[2:]
+    for k in range(len(wanted) - 1, -1, -1):
+        for b in range(len(value)):
             cost[0, 0] = 0.0
-            for i in range(d - 1):
+            for i in range(n + m):
                 cost[0, 1 + i] = cost[1 + i, 0] = dt * slope[k, b, i]
-                for j in range(d - 1):
+                for j in range(n + m):
                     cost[1 + i, 1 + j] = dt * curvature[k, b, i, j]
-            _join(drift[k, b], push[k, b], dt, motion[1:, 1:])
-            _join(by_state[k, b], by_control[k, b], 1.0, through[:, 1:])
-            for i in range(1, s):
-                motion[i, i] += 1.0
-            _add_transformed(value[b], motion, room, cost)
-            _substitute(through, cost, room, q)
+            for j in range(n):
+                for i in range(n):
+                    motion[1 + i, 1 + j] = dt * drift[k, b, i, j] + (1.0 if i == j else 0.0)
+                for i in range(m):
+                    through[i, 1 + j] = by_state[k, b, i, j]
+            for j in range(m):
+                for i in range(n):
+                    motion[1 + i, 1 + n + j] = dt * push[k, b, i, j]
+                for i in range(m):
+                    through[i, 1 + n + j] = by_control[k, b, i, j]
+            _add_transformed(value[b], motion, products, cost)
+            _substitute(through, cost, products, q)
             _respond(q, wanted[k, b], lower, upper, ridge[b], of_controls, response[k, b])
-            _substitute(response[k, b], q, room, value[b])
-    return response
-
-
-@compiled(f"void({_R2}, {_R2}, f8, f8[:, :])")
-def _join(left: Floats, right: Floats, factor: float, result: Floats) -> None:
-    """The result (r, a + b) is a factor times [left, right], (r, a) and (r, b)."""
-    for i in range(len(left)):
-        for j in range(left.shape[1]):
-            result[i, j] = factor * left[i, j]
-        for j in range(right.shape[1]):
-            result[i, left.shape[1] + j] = factor * right[i, j]
+            _substitute(response[k, b], q, products, value[b])
 
 
 @compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
@@ -167,7 +166,7 @@ def _substitute(rows: Floats, matrix: Floats, room: Floats, result: Floats) -> N
             result[i, j] = result[j, i] = total
 
 
-@compiled(f"void(f8[:, ::1], {_R1}, {_R1}, {_R1}, f8, f8[:, :, ::1], f8[:, ::1])")
+@compiled("void(f8[:, ::1], f8[::1], f8[::1], f8[::1], f8, f8[:, :, ::1], f8[:, ::1])")
 def _respond(
     q: Floats,
     wanted: Floats,
