@@ -19,8 +19,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy  # loads scipy.special when it is first used
-from scipy import sparse
+import scipy  # loads scipy.special and scipy.sparse when they are first used
 
 from mlci.flows import fixed_point, reached
 from mlci.spaces import Bools, Floats
@@ -127,11 +126,13 @@ class CausalEntropy:
         values[self.table.goals] = 0.0
         return values
 
-    def _flow(self, policy: Floats) -> sparse.csr_matrix:
+    def _flow(self, policy: Floats) -> scipy.sparse.csr_matrix:
         """(S, S) what a visit of a state brings to the next step, discounted."""
         states = self.table.states
         row, weight = np.arange(states).repeat(self.table.actions), policy.ravel()
-        choice = sparse.csr_matrix((weight, (row, np.arange(len(row)))), shape=(states, len(row)))
+        choice = scipy.sparse.csr_matrix(
+            (weight, (row, np.arange(len(row)))), shape=(states, len(row))
+        )
         return self.discount * (choice @ self.table.transitions)
 
     def _stationary_values(self) -> Floats:

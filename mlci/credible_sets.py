@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
+import scipy  # loads scipy.sparse when it is first used
 
 from mlci.evidence import rank_scores
 from mlci.regions import Regions
@@ -92,7 +92,7 @@ def credible_set(
     )
 
 
-def neighbours(regions: Regions) -> sparse.csr_matrix:
+def neighbours(regions: Regions) -> scipy.sparse.csr_matrix:
     """(C, C) sparse: which regions overlap, or touch along a side and not in a corner alone."""
     boxes = [middle_and_half(regions.box(i)) for i in range(len(regions))]
     middle, half = np.array(boxes).reshape(-1, 2, regions.space.dimension).transpose(1, 0, 2)
@@ -101,8 +101,8 @@ def neighbours(regions: Regions) -> sparse.csr_matrix:
         # How far apart two regions are in each dimension; below 0 where they overlap.
         gap = np.abs(regions.space.difference(middle, middle[i])) - (half + half[i])
         touches = np.all(gap <= slack, axis=1) & (np.sum(gap > -slack, axis=1) <= 1)
-        rows.append(sparse.csr_matrix(touches))
-    return sparse.vstack(rows, format="csr")
+        rows.append(scipy.sparse.csr_matrix(touches))
+    return scipy.sparse.vstack(rows, format="csr")
 
 
 def _joined(hypotheses: Regions, numbers: Ints) -> list[Ints]:

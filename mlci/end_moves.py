@@ -9,7 +9,7 @@ cell would seem unavoidable, although the demonstration begins and ends outside 
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
+import scipy  # loads scipy.sparse when it is first used
 
 from mlci.merged_moves import MergedMoves
 from mlci.simulate import rollout
@@ -35,7 +35,9 @@ def last_moves(model: TabularModel, cells: Ints, goal_cells: Ints, goal: Box) ->
         bent = follow(model.grid, model.regions, _bent(model, path, goal))
         parts.append((block[row], moves.reward[row, move], *bent))
     cell, reward, successor = (np.concatenate([part[i] for part in parts]) for i in range(3))
-    return _allowed(model, cell, reward, successor, sparse.vstack([part[3] for part in parts]))
+    return _allowed(
+        model, cell, reward, successor, scipy.sparse.vstack([part[3] for part in parts])
+    )
 
 
 def only_moves(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> MergedMoves:
@@ -62,7 +64,11 @@ def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
 
 
 def _allowed(
-    model: TabularModel, cell: Ints, reward: Floats, successor: Ints, crosses: sparse.csr_matrix
+    model: TabularModel,
+    cell: Ints,
+    reward: Floats,
+    successor: Ints,
+    crosses: scipy.sparse.csr_matrix,
 ) -> MergedMoves:
     """L moves, in order of cell; those that leave the space or cross the truth are forbidden.
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
+import scipy  # loads scipy.sparse when it is first used
 
 from mlci.flows import fixed_point, reached, spectral_radius
 from mlci.spaces import Floats, Ints
@@ -57,10 +57,10 @@ class FirstExit:
         within = ends[0][between], ends[1][between]
         exits = np.zeros(len(inner))
         np.add.at(exits, ends[0][~between], weight[~between])
-        scaled = fixed_point(sparse.csr_matrix((weight[between], within), shape=shape), exits)
+        scaled = fixed_point(scipy.sparse.csr_matrix((weight[between], within), shape=shape), exits)
         if not np.all(scaled > 0.5):  # each is 1 or more, if the sum converges
             growth = spectral_radius(
-                sparse.csr_matrix((np.exp(reward[between]), within), shape=shape)
+                scipy.sparse.csr_matrix((np.exp(reward[between]), within), shape=shape)
             )
             raise ValueError(
                 "the sum over trajectories diverges: with every step, those still on their way "
@@ -103,7 +103,7 @@ class FirstExit:
         if np.any(stuck := (table.start > 0) & (self.log_z == -np.inf)):
             raise ValueError(f"no goal can be reached from {np.flatnonzero(stuck).tolist()}")
         state, action = np.nonzero(policy := self.policy)
-        back = sparse.csr_matrix(
+        back = scipy.sparse.csr_matrix(
             (policy[state, action], (table.successor[state, action], state)),
             shape=(table.states, table.states),
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
+import scipy  # loads scipy.sparse when it is first used
 
 from mlci.spaces import Bools, Floats, Ints
 
@@ -22,7 +22,7 @@ def reached(seeds: Ints, begin: Ints, end: Ints, states: int) -> Bools:
     return marked
 
 
-def fixed_point(flow: sparse.csr_matrix, source: Floats) -> Floats:
+def fixed_point(flow: scipy.sparse.csr_matrix, source: Floats) -> Floats:
     """The x (S,) with x = flow x + source; nan where the system is singular.
 
     No flow is negative. With pivots on the diagonal alone, elimination then adds numbers of one
@@ -32,7 +32,7 @@ def fixed_point(flow: sparse.csr_matrix, source: Floats) -> Floats:
         return np.empty(0)
     from scipy.sparse.linalg import splu  # loads scipy.linalg, only where it is used
 
-    system = sparse.identity(len(source), format="csc") - flow
+    system = scipy.sparse.identity(len(source), format="csc") - flow
     order = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}}
     try:
         return np.asarray(splu(system.tocsc(), diag_pivot_thresh=0.0, **order).solve(source))
@@ -40,7 +40,7 @@ def fixed_point(flow: sparse.csr_matrix, source: Floats) -> Floats:
         return np.full(len(source), np.nan)
 
 
-def spectral_radius(flow: sparse.csr_matrix) -> float:
+def spectral_radius(flow: scipy.sparse.csr_matrix) -> float:
     """About the spectral radius of a flow (S, S) of numbers >= 0, by power iteration."""
     vector, growth = np.ones(flow.shape[0]), 0.0
     for _ in range(_POWERS):  # of (I + flow) / 2, since the flow itself may be periodic

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy  # loads scipy.sparse when it is first used
 from numpy.typing import ArrayLike
-from scipy import sparse
 
 from mlci.chords import Boxes
 from mlci.grids import Grid
@@ -184,7 +184,7 @@ class Regions:
 
     def crossings(
         self, starts: Floats, steps: Floats, tested: Bools | None = None
-    ) -> sparse.csr_matrix:
+    ) -> scipy.sparse.csr_matrix:
         """Which regions paths of straight chords cross.
 
         Args:
@@ -198,7 +198,7 @@ class Regions:
         tested = np.ones(len(starts), dtype=bool) if tested is None else tested
         begins, region, *_ = self._boxes.hits(self.space.wrap(starts), steps, tested)
         entered = np.ones(len(region), dtype=bool)
-        return sparse.csr_matrix((entered, region, begins), shape=(len(starts), len(self)))
+        return scipy.sparse.csr_matrix((entered, region, begins), shape=(len(starts), len(self)))
 
     def chord_hits(self, starts: Floats, steps: Floats) -> tuple[Ints, Ints, Floats, Floats]:
         """Pairs (chord, image) that meet, and shares of the chord between; starts wrapped."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
+import scipy  # loads scipy.sparse when it is first used
 
 from mlci.spaces import Bools, Floats, Ints
 
@@ -26,7 +26,7 @@ class SingleMoves:
 
     successor: Ints
     reward: Floats
-    crosses: sparse.csr_matrix
+    crosses: scipy.sparse.csr_matrix
 
     def __post_init__(self) -> None:
         shape = self.successor.shape
@@ -47,7 +47,7 @@ class SingleMoves:
         return cls(
             np.concatenate([part.successor for part in parts]),
             np.concatenate([part.reward for part in parts]),
-            sparse.vstack([part.crosses for part in parts], format="csr"),
+            scipy.sparse.vstack([part.crosses for part in parts], format="csr"),
         )
 
     def of(self, cells: Ints) -> SingleMoves:
@@ -63,7 +63,7 @@ class SingleMoves:
         """(Q, M) reward of a move, -inf where it is not allowed."""
         return np.where(self.allowed(truth), self.reward, -np.inf)
 
-    def _rows(self, cells: Ints) -> sparse.csr_matrix:
+    def _rows(self, cells: Ints) -> scipy.sparse.csr_matrix:
         """The rows of `crosses` that belong to some cells."""
         moves = self.successor.shape[1]
         return self.crosses[(cells[:, None] * moves + np.arange(moves)).ravel()]

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy  # loads scipy.sparse when it is first used
 from numpy.typing import ArrayLike
-from scipy import sparse
 
 from mlci.regions import as_mask
 from mlci.spaces import Bools, Floats, Ints
@@ -83,19 +83,19 @@ class Table:
         truth: (C,) mask of the regions that no move may belong to, see `under`.
     """
 
-    transitions: sparse.csr_matrix
+    transitions: scipy.sparse.csr_matrix
     reward: Floats
     allowed: Bools
     start: Floats
     goals: Ints
     regions: Mapping[str, TableRegion]
-    crosses: sparse.csr_matrix
+    crosses: scipy.sparse.csr_matrix
     truth: Bools
 
     @classmethod
     def from_arrays(
         cls,
-        transitions: ArrayLike | sparse.csr_matrix,
+        transitions: ArrayLike | scipy.sparse.csr_matrix,
         reward: ArrayLike,
         start: int | ArrayLike,
         goals: int | Iterable[int] = (),
@@ -241,7 +241,9 @@ def _distribution(start: int | ArrayLike, states: int) -> Floats:
     return begins
 
 
-def _crossings(chances: sparse.csr_matrix, regions: Sequence[TableRegion]) -> sparse.csr_matrix:
+def _crossings(
+    chances: scipy.sparse.csr_matrix, regions: Sequence[TableRegion]
+) -> scipy.sparse.csr_matrix:
     """(S * A, C) boolean: which moves belong to which regions."""
     states = chances.shape[1]
     actions = chances.shape[0] // states
@@ -255,12 +257,12 @@ def _crossings(chances: sparse.csr_matrix, regions: Sequence[TableRegion]) -> sp
     alone = _incidence(rows, chances.shape[0], "moves of a region")
     state, action = np.divmod(np.arange(chances.shape[0]), actions)
     belongs = inside[state] + chances @ inside + by[action] + alone
-    return sparse.csr_matrix(belongs > 0)
+    return scipy.sparse.csr_matrix(belongs > 0)
 
 
-def _incidence(members: Sequence[ArrayLike], count: int, what: str) -> sparse.csr_matrix:
+def _incidence(members: Sequence[ArrayLike], count: int, what: str) -> scipy.sparse.csr_matrix:
     """(count, C) with a 1 for each of the numbers that C lists hold."""
     lists = [in_range(np.unique(np.asarray(each, dtype=np.int64)), count, what) for each in members]
     column = np.repeat(np.arange(len(lists)), [len(each) for each in lists])
     row = np.concatenate([*lists, np.empty(0, dtype=np.int64)])
-    return sparse.csr_matrix((np.ones(len(row)), (row, column)), shape=(count, len(lists)))
+    return scipy.sparse.csr_matrix((np.ones(len(row)), (row, column)), shape=(count, len(lists)))

@@ -23,8 +23,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import scipy  # loads scipy.sparse when it is first used
 from numpy.typing import ArrayLike
-from scipy import sparse
 
 from mlci.grids import Grid
 from mlci.merged_moves import MergedMoves, merge_moves
@@ -293,7 +293,7 @@ def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int
     return int(np.ceil(dt / shortest - 1e-9))
 
 
-def follow(grid: Grid, regions: Regions, path: Floats) -> tuple[Ints, sparse.csr_matrix]:
+def follow(grid: Grid, regions: Regions, path: Floats) -> tuple[Ints, scipy.sparse.csr_matrix]:
     """Successor (-1 where the path leaves the space) and crossings of paths (Q, K+1, n)."""
     stays = np.all(grid.space.contains(path), axis=-1)
     successor = np.where(stays, grid.index(path[:, -1]), -1)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # loads scipy.sparse when it is first used
 from numpy.typing import ArrayLike
-from scipy import sparse
 
 from mlci.spaces import Ints
 
 ROUNDING = 1e-9  # how far probabilities may be from adding up to 1
 
 
-def as_transitions(transitions: ArrayLike | sparse.csr_matrix) -> sparse.csr_matrix:
+def as_transitions(transitions: ArrayLike | scipy.sparse.csr_matrix) -> scipy.sparse.csr_matrix:
     """Sparse probabilities (S * A, S) of what follows action a in state s, in row s * A + a.
 
     Args:
@@ -22,14 +22,14 @@ def as_transitions(transitions: ArrayLike | sparse.csr_matrix) -> sparse.csr_mat
         ValueError: another shape, successors that are no states, probabilities that are negative or
             do not add up to 1, or to 0.
     """
-    if sparse.issparse(transitions):
-        chances = sparse.csr_matrix(transitions, dtype=float, copy=True)
+    if scipy.sparse.issparse(transitions):
+        chances = scipy.sparse.csr_matrix(transitions, dtype=float, copy=True)
     else:
         array = np.asarray(transitions)
         if array.ndim == 2 and array.dtype.kind in "iu":
             chances = _certain(array)
         elif array.ndim == 3 and array.shape[0] == array.shape[2]:
-            chances = sparse.csr_matrix(array.reshape(-1, array.shape[2]).astype(float))
+            chances = scipy.sparse.csr_matrix(array.reshape(-1, array.shape[2]).astype(float))
         else:
             raise ValueError(
                 "transitions are whole numbers (S, A), probabilities (S, A, S) or a sparse "
@@ -50,14 +50,14 @@ def as_transitions(transitions: ArrayLike | sparse.csr_matrix) -> sparse.csr_mat
     return chances
 
 
-def _certain(successor: Ints) -> sparse.csr_matrix:
+def _certain(successor: Ints) -> scipy.sparse.csr_matrix:
     """(S * A, S) with a 1 for each successor (S, A) that is not -1."""
     flat = successor.ravel()
     there = flat != -1
     in_range(flat[there], len(successor), "successors")
     begins = np.append(0, np.cumsum(there))
     shape = len(flat), len(successor)
-    return sparse.csr_matrix((np.ones(begins[-1]), flat[there], begins), shape=shape)
+    return scipy.sparse.csr_matrix((np.ones(begins[-1]), flat[there], begins), shape=shape)
 
 
 def in_range(numbers: Ints, count: int, what: str) -> Ints:

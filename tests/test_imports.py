@@ -217,7 +217,7 @@ def test_mlci_is_mathematics_alone(graph: Graph) -> None:
 
 def test_mlci_loads_late_what_takes_time_and_not_every_use_needs() -> None:
     late = {"pandas", "numba", "joblib", "matplotlib", "html"}
-    late |= {f"scipy.{part}" for part in ("interpolate", "linalg", "optimize", "special")}
+    late |= {f"scipy.{part}" for part in ("interpolate", "linalg", "optimize", "sparse", "special")}
     code = f"import sys, mlci, mlci.temperature; print(*sys.modules.keys() & {late!r})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
