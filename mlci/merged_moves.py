@@ -84,11 +84,17 @@ def merge_moves(blocks: Iterable[SingleMoves]) -> MergedMoves:
         crosses = block.crosses
         crosses.sort_indices()
         begins, region = crosses.indptr.astype(np.int64), crosses.indices.astype(np.int32)
-        cells, first, log_weight = _merge(block.successor, block.reward, begins, region)
+        cells, moves = block.successor.shape
+        ends, first = np.zeros(cells + 1, dtype=np.int64), np.empty(cells * moves, dtype=np.int64)
+        log_weight, total = np.full(cells * moves, -np.inf), np.zeros(cells * moves)
+        table = np.full(1 << (2 * moves - 1).bit_length(), -1)
+        room = total, table, np.empty(moves, dtype=np.int64)
+        _merge(block.successor, block.reward, begins, region, room, ends, first, log_weight)
+        first, log_weight = first[: ends[-1]], log_weight[: ends[-1]].copy()
         chosen = crosses[first]
         parts.append(
             {
-                "begins": np.diff(cells),
+                "begins": np.diff(ends),
                 "successor": block.successor.ravel()[first],
                 "log_weight": log_weight,
                 "crossing_begins": np.diff(chosen.indptr),
@@ -115,24 +121,28 @@ def _alike(begins: Ints, region: Ints, one: int, other: int) -> bool:
     return same
 
 
-@compiled("Tuple((i8[::1], i8[::1], f8[::1]))(i4[:, ::1], f8[:, ::1], i8[::1], i4[::1])")
-def _merge(successor, reward, begins, region):  # type: ignore[no-untyped-def]
-    """The merged moves of Q cells: where each cell's begin (Q+1,), and of each the number of its
-    first move, q M + move, and the log of the sum of e^reward over its moves.
+@compiled(
+    "void(i4[:, ::1], f8[:, ::1], i8[::1], i4[::1], Tuple((f8[::1], i8[::1], i8[::1])), "
+    "i8[::1], i8[::1], f8[::1])"
+)
+def _merge(  # type: ignore[no-untyped-def]
+    successor, reward, begins, region, room, ends, first, log_weight
+):
+    """The merged moves of Q cells: where each cell's end, and of each the number of its first move,
+    q M + move, and the log of the sum of e^reward over its moves.
 
     Args:
         successor, reward: (Q, M).
         begins, region: what move q M + move crosses, as of `_alike`.
+        room: zeros (Q M,) for sums; -1s, 2M or more and a power of 2; and anything (M,).
+        ends: (Q+1,), from 0 on; of this and the next two the entries that count are filled in.
+        first: (Q M,).
+        log_weight: (Q M,), -inf before.
     """
+    # The table is of merged moves of a cell, by a hash of successor and regions; `merged` has the
+    # merged move that each move of a cell belongs to.
+    total, table, merged = room
     cells, moves = successor.shape
-    ends = np.zeros(cells + 1, np.int64)
-    first = np.empty(cells * moves, np.int64)
-    best, total = np.empty(cells * moves), np.zeros(cells * moves)
-    merged = np.empty(moves, np.int64)  # merged move that each move of a cell belongs to
-    size = 1
-    while size < 2 * moves:
-        size *= 2
-    table = np.full(size, -1)  # merged moves of a cell, by a hash of successor and regions
     count = 0
     for cell in range(cells):
         for move in range(moves):
@@ -142,23 +152,26 @@ def _merge(successor, reward, begins, region):  # type: ignore[no-untyped-def]
             place = np.int64(successor[cell, move]) * 40503
             for i in range(begins[number], begins[number + 1]):
                 place = (place ^ region[i]) * 16777619
-            place = (place ^ (place >> 15)) & (size - 1)
+            place = (place ^ (place >> 15)) & (len(table) - 1)
             while table[place] >= 0:
                 other = first[table[place]]
                 if successor[cell, move] == successor[cell, other - cell * moves] and _alike(
                     begins, region, number, other
                 ):
                     break
-                place = (place + 1) & (size - 1)
+                place = (place + 1) & (len(table) - 1)
             if table[place] < 0:
-                table[place], first[count], best[count] = count, number, -np.inf
+                table[place], first[count] = count, number
                 count += 1
             merged[move] = table[place]
-            best[merged[move]] = max(best[merged[move]], reward[cell, move])
+            best = log_weight[merged[move]]
+            log_weight[merged[move]] = max(best, reward[cell, move])
         for move in range(moves):
             if successor[cell, move] >= 0:
-                total[merged[move]] += np.exp(reward[cell, move] - best[merged[move]])
+                total[merged[move]] += np.exp(reward[cell, move] - log_weight[merged[move]])
         if ends[cell] < count:
-            table[:] = -1
+            for slot in range(len(table)):
+                table[slot] = -1
         ends[cell + 1] = count
-    return ends, first[:count].copy(), best[:count] + np.log(total[:count])
+    for k in range(count):
+        log_weight[k] += np.log(total[k])
