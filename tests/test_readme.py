@@ -48,7 +48,7 @@ SHORT = [
     (r"^(git clone|cd mlci|xdg-open) ?.*", "true"),
     (r"^\.venv/bin/python (.*)=FOLDER", r"python \1=recorded"),
     (r"^pip install \.$", "test -e pyproject.toml"),  # as tests/stress/wheel.sh does
-    (r"^pip install '\.\[(\w+)\]'", r"grep '^\1 = ' pyproject.toml"),
+    (r"^pip install (?:-e )?'\.\[(\w+)\]'", r"grep '^\1 = ' pyproject.toml"),
     (r"^(python -m paper_figures( [a-z ]+)?)( --jobs 2)?$", r"\1 --jobs 1"),
     # These are run, and what they make is looked at, in experiments/config/test_own_system.py.
     (r"^mlci-.* ?unicycle.*", "true"),
