@@ -13,7 +13,7 @@ from experiments.config import memory
 from experiments.config.memory import expected_memory, machine_memory
 from experiments.config.settings import GridSettings, Settings
 from mlci.maxent import TrajectoryDistribution
-from mlci.spaces import Box
+from mlci.spaces import Box, Floats
 from mlci.tabular import action_grid, discretize
 
 
@@ -27,16 +27,23 @@ def test_a_model_takes_no_more_than_expected_and_not_much_less(
         settings, grid=GridSettings((160, 100), None), actions=9, dt=0.1, horizon=2.0
     )
     monkeypatch.setattr(memory, "_BYTES_AT_REST", 0)
+    violation_probabilities(settings)  # loops are compiled, which takes memory once
     tracemalloc.start()
-    actions = action_grid(large.model, large.action_counts)
-    model = discretize(large.model, large.cells, actions, large.dt, large.candidates)
-    start = int(large.cells.index([-1.0, 0.5]))
-    goal = large.cells.cells_in(Box(np.array([-0.5, -np.inf]), np.array([0.5, np.inf])))
-    phi = TrajectoryDistribution(model, start, goal, 20).violation_probabilities()
+    phi = violation_probabilities(large)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert np.max(phi) > 0.5
     assert peak < expected_memory(large) < 4 * peak
+
+
+def violation_probabilities(settings: Settings) -> Floats:
+    """Phi (C,) of one task, from the system on."""
+    actions = action_grid(settings.model, settings.action_counts)
+    model = discretize(settings.model, settings.cells, actions, settings.dt, settings.candidates)
+    start = int(settings.cells.index([-1.0, 0.5]))
+    goal = settings.cells.cells_in(Box(np.array([-0.5, -np.inf]), np.array([0.5, np.inf])))
+    steps = round(settings.horizon / settings.dt)
+    return TrajectoryDistribution(model, start, goal, steps).violation_probabilities()
 
 
 def test_every_axis_of_size_counts(settings: Settings) -> None:
