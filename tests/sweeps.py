@@ -63,9 +63,10 @@ class Faulty(DoubleIntegrator):
         if fault == "warn":
             os.system("echo from another program")
             warnings.warn("the mass wobbles")
-        # No file may grow beyond this: a full disk, for one point.
-        most = 5_000 if fault == "full" else resource.RLIM_INFINITY
-        resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
+        # No file may grow beyond this: a full disk, for one point, once it is accepted.
+        if accepted or self.fault != "full":
+            most = 5_000 if fault == "full" else resource.RLIM_INFINITY
+            resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
         return super().dynamics(states, controls)
 """
 
