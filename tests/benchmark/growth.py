@@ -115,9 +115,9 @@ FACTORS: dict[str, dict[int, Size]] = {
     },
     "actions": {
         first * second: Size(actions=(first, second))
-        for first, second in ((3, 1), (5, 3), (15, 5), (25, 15))
+        for first, second in ((3, 3), (5, 3), (15, 5), (25, 15))
     },
-    "steps": {steps: Size(steps=steps) for steps in (5, 20, 80, 320)},
+    "steps": {steps: Size(steps=steps) for steps in (10, 20, 80, 320)},
     "dimensions": {n: Size("torus", shape, (3, 3), dt=0.5) for n, shape in SPACES.items()},
 }
 
