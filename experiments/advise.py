@@ -223,7 +223,7 @@ def _try(
     )
     formed = time.process_time() - before
     distributions = [TrajectoryDistribution.of_task(model, task) for task in tasks]
-    reached = np.array([each.reachable[-1, each.goal].any() for each in distributions])
+    reached = np.array([each.is_possible for each in distributions])
     task_s = np.nan
     if reached.any():
         first = distributions[int(np.argmax(reached))]

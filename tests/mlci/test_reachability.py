@@ -322,3 +322,15 @@ def test_the_border_round_a_wall_errs_by_at_most_half_a_cell_to_either_side(corn
     wrong = safe_set.contains(states[clear]) == doomed[clear]
     assert not np.any(wrong & doomed[clear])
     assert np.sum(wrong) < 0.001 * len(wrong)
+
+
+def test_steepness_bounds_the_rise_between_any_two_states_across_the_seam_as_well() -> None:
+    system = Pendulum()
+    grid = Grid(system.space, (20, 9))
+    safe = SafeSet.from_values(grid, grid.centers[:, 0])  # rises by a cell, falls back at the seam
+    width = grid.widths[0]
+    np.testing.assert_allclose(safe.steepness, 19.0, rtol=1e-12)
+    for angle, slope in ((0.0, 19.0), (3.0, 1.0)):
+        states = np.array([[angle - width / 4, 0.0], [angle + width / 4, 0.0]])
+        before, after = safe.value(states)
+        np.testing.assert_allclose(abs(after - before), slope * width / 2, rtol=1e-9)

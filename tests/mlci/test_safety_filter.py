@@ -190,3 +190,20 @@ def test_impossible_filters_are_refused():
         SafetyFilter(PENDULUM, omega, DT, -0.1)
     with pytest.raises(ValueError, match=r"at least 0, not 0\.1 and -1"):
         SafetyFilter(PENDULUM, omega, DT, 0.1, -1)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_clearance_is_how_far_a_state_may_move_before_the_filter_acts(width: float) -> None:
+    """Where V falls as steeply as anywhere, straight towards K, no farther and no less far."""
+    system = DoubleIntegrator()
+    grid = Grid(system.space, (31, 31))
+    omega = SafeSet.from_values(grid, 2 * grid.centers[:, 0])
+    keep_in = SafetyFilter(system, omega, DT, margin=0.1, width=width)
+    states = np.column_stack([np.linspace(0.5, 2.0, 7), np.linspace(-1.0, 1.0, 7)])
+    clearance = keep_in.clearance(states)
+    np.testing.assert_allclose(clearance, states[:, 0] - (0.1 + width) / 2, rtol=1e-12)
+    away = -omega.safe_control(system, states)
+    for share, acts in ((0.999, False), (1.001, True)):
+        ahead = states - share * clearance[:, None] * [1.0, 0.0]
+        changed = (keep_in.apply(states, away, ahead) != away).any(axis=1)
+        assert (changed == acts).all()
