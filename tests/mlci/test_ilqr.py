@@ -8,7 +8,7 @@ from scipy.optimize import brentq, lsq_linear
 from mlci.control_problem import ControlFilter
 from mlci.grids import Grid
 from mlci.ilqr import optimize
-from mlci.reachability import solve_safe_set
+from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import EULER, RK4, euler_step, rollout
@@ -515,3 +515,24 @@ def test_shapes_that_disagree_are_named():
     lower, upper = np.zeros((1, 2)), np.array([[0.0, np.inf]])
     with pytest.raises(ValueError, match="both ends or at neither"):
         optimize(MASS, lower, lower, upper, np.zeros((1, 10, 1)), DT)
+
+
+class Asked(SafetyFilter):
+    """A filter that is asked at every state, however far it is from acting."""
+
+    def clearance(self, states):
+        return np.zeros(states.shape[:-1])
+
+
+def test_a_filter_that_is_asked_only_where_it_could_act_changes_nothing():
+    grid = Grid(MASS.space, (31, 31))
+    safe = SafeSet.from_values(grid, 2 * grid.centers[:, 0])  # it falls evenly towards K
+    starts = np.column_stack([np.linspace(0.3, 2.0, 6), np.linspace(-1.0, 0.5, 6)])
+    goals, guesses = np.tile([-1.0, 0.0], (6, 1)), np.full((6, 200, 1), -0.5)
+    found, asked = (
+        optimize(MASS, starts, goals, goals, guesses, DT, safety_filter=kind(MASS, safe, DT, 0.1))
+        for kind in (SafetyFilter, Asked)
+    )
+    assert np.any(found.controls > 0.9)  # by the filter: the goal is the other way
+    np.testing.assert_array_equal(found.states, asked.states)
+    np.testing.assert_array_equal(found.controls, asked.controls)

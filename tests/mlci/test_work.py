@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
@@ -93,6 +94,24 @@ def test_log_z_and_phi_take_one_exponential_for_each_merged_move_on_a_way(
     cell = np.repeat(np.arange(model.states), np.diff(merged.begins))
     ways = np.sum((log_z[:-1, cell] > -np.inf) & (log_z[1:, merged.successor] > -np.inf))
     assert 0 < sum(exponentials) <= ways
+
+
+def test_probabilities_of_regions_take_no_more_memory_than_they_may(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    distribution = TrajectoryDistribution.of_task(
+        papers_pendulum(Pendulum()), Task(np.array([0.5, 0.0]), Box.point([3.0, 0.0]), 5.0)
+    )
+    whole = distribution.avoidance_probabilities()  # and what tasks share is made, loops compiled
+    two_steps = 2 * 8 * 400 * 100
+    monkeypatch.setattr(recursions, "ALPHA_BYTES", two_steps // 10)
+    tracemalloc.start()
+    try:
+        np.testing.assert_array_equal(distribution.avoidance_probabilities(), whole)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert two_steps // 10 < most < two_steps / 2  # log Z and what it is made of beside them
 
 
 def test_an_iteration_of_the_demonstrator_takes_eight_rates_and_a_jacobian_a_step() -> None:
