@@ -17,12 +17,12 @@ import numpy as np
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
-from mlci.spaces import Box, Floats
+from mlci.spaces import Floats
 from mlci.systems import Pendulum, TelescopingPendulum
 from mlci.tabular import TabularModel, action_grid, discretize
 from tests.benchmark import loops, plain
 from tests.benchmark.contest import OURS, Contender, Contest, Work
-from tests.benchmark.growth import Torus
+from tests.benchmark.growth import Size, Torus, systems
 from tests.benchmark.plain import Table, World
 from tests.benchmark.timing import copy_rate, exp_seconds
 
@@ -59,43 +59,32 @@ def pendulum(system: Pendulum, goal: bool, steps: int = 20) -> World:
     )
 
 
-def telescope() -> World:
-    """The paper's telescoping pendulum: 2500 cells, 15 actions, 100 hypotheses."""
-    system = TelescopingPendulum()
-    grid = Grid(system.space, (10, 5, 10, 5))
-    free = np.array([0.0, np.inf, 0.0, np.inf])
-    goal = Box(np.array([0.38, 0.0, 9.32, 0.0]) - free, np.array([0.58, 0.0, 9.92, 0.0]) + free)
+def _grown(size: Size, substeps: int) -> World:
+    """A system, start and goal on which growth is measured, with 100 hypotheses."""
+    system, start, goal = systems(size)
+    grid = Grid(system.space, size.shape)
     return World(
-        "telescope",
+        size.system,
         system,
         grid,
-        action_grid(system, [5, 3]),
-        0.25,
+        action_grid(system, size.actions),
+        size.dt,
         Regions.from_grid(system.space, (10, None, 10, None)),
-        4,
-        np.array([-0.48, 0.0, 6.38, 0.0]),
+        substeps,
+        start,
         grid.cells_in(goal),
-        20,
+        size.steps,
     )
+
+
+def telescope() -> World:
+    """The paper's telescoping pendulum: 2500 cells, 15 actions, 100 hypotheses."""
+    return _grown(Size(shape=(10, 5, 10, 5)), substeps=4)
 
 
 def torus() -> World:
     """Four angles, 104 976 cells, most of which are active."""
-    system = Torus()
-    grid, around = Grid(system.space, (18,) * 4), np.array([1.0, 1.0, np.inf, np.inf])
-    start = 0.7 + 1.1 * np.arange(4)  # no two alike, which would stay so
-    return World(
-        "torus",
-        system,
-        grid,
-        action_grid(system, [5, 3]),
-        0.25,
-        Regions.from_grid(system.space, (10, None, 10, None)),
-        3,
-        start,
-        grid.cells_in(Box(start + 0.5 - around, start + 0.5 + around)),
-        20,
-    )
+    return _grown(Size("torus", (18,) * 4), substeps=3)
 
 
 def size(world: World) -> str:
