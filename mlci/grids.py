@@ -149,14 +149,14 @@ class Grid:
             (..., *values.shape[1:]), linear between centres, extrapolated linearly over the half
             cell between the outermost centres and the bounds.
         """
-        columns = np.ascontiguousarray(values, dtype=float).reshape(self.size, -1)
+        columns = np.asarray(values, dtype=float).reshape(self.size, -1)
         between = self._between(columns, np.asarray(states), _VALUE)
         return between.reshape((*np.shape(states)[:-1], *values.shape[1:]))
 
     def slope(self, values: Floats, states: ArrayLike) -> Floats:
         """Exact gradient (..., n) of `interpolate` for values (S,); 0 beyond the bounds."""
         states, bounds = np.asarray(states), self.space.bounds
-        columns = np.ascontiguousarray(values, dtype=float)[:, None]
+        columns = np.asarray(values, dtype=float)[:, None]
         slopes = [
             self._between(columns, states, d).reshape(states.shape[:-1]) / width
             for d, width in enumerate(self.widths)
@@ -180,7 +180,7 @@ _VALUE = -1  # in place of a dimension along which `_multilinear` takes the rise
 
 
 @compiled(
-    "f8[:, ::1](Array(f8, 2, 'C', readonly=True), Array(f8, 2, 'A', readonly=True), "
+    "f8[:, ::1](Array(f8, 2, 'A', readonly=True), Array(f8, 2, 'A', readonly=True), "
     "Array(f8, 1, 'C', readonly=True), Array(f8, 1, 'C', readonly=True), i8[::1], "
     "Array(b1, 1, 'C', readonly=True), i8)"
 )

@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -191,6 +193,21 @@ def test_grid_refuses_a_shift_that_leaves_the_space(offset):
 def test_grid_refuses(shape):
     with pytest.raises(ValueError, match=r"over \('a', 'b'\) needs 2 counts of at least 1, not"):
         Grid(grid_of((6, 5)).space, shape)
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_few_states_copy_no_table(order):
+    """Gradients lie a dimension after the other, and are asked for at every step of a roll-out."""
+    grid = grid_of((60, 50))
+    values = np.asarray(np.random.default_rng(5).normal(size=(grid.size, 2)), order=order)
+    state = grid.centers[7]
+    np.testing.assert_allclose(grid.interpolate(values, state), values[7], atol=1e-12)
+    tracemalloc.start()
+    grid.interpolate(values, state)
+    grid.slope(values[:, 0], state)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < values.nbytes / 4
 
 
 def test_one_state_alone_has_the_value_that_it_has_among_others():
