@@ -205,7 +205,7 @@ def _held(
     drift = np.asfortranarray(system.dynamics(now, control))
     rates = system.stopped(drift, now)
     for k in range(steps):
-        then = _rk4_step(system, now, control, drift, step)
+        then = np.asfortranarray(system.clip(rk4_step(system, now, control, step, drift)))
         drift = np.asfortranarray(system.dynamics(then, control))
         rates_then = system.stopped(drift, then)
         boxes.approach((now, then), (rates, rates_then), step, distance, least)
@@ -220,13 +220,3 @@ def _held(
             )
     best[row] = np.maximum(best[row], least)
     return best
-
-
-def _rk4_step(
-    system: _Sliding, states: Floats, controls: Floats, k1: Floats, step: float
-) -> Floats:
-    """`rk4_step` within the bounds from states (B, n) whose rates k1 (B, n) are known."""
-    k2 = system.dynamics(states + step / 2 * k1, controls)
-    k3 = system.dynamics(states + step / 2 * k2, controls)
-    k4 = system.dynamics(states + step * k3, controls)
-    return np.asfortranarray(system.clip(states + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)))

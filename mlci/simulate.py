@@ -52,9 +52,14 @@ def euler_step(system: System, states: Floats, controls: Floats, dt: Seconds) ->
     return states + dt * system.dynamics(states, controls)
 
 
-def rk4_step(system: System, states: Floats, controls: Floats, dt: Seconds) -> Floats:
-    """One classical Runge-Kutta step: states (..., n) after dt [s], fourth order."""
-    k1 = system.dynamics(states, controls)
+def rk4_step(
+    system: System, states: Floats, controls: Floats, dt: Seconds, rates: Floats | None = None
+) -> Floats:
+    """One classical Runge-Kutta step: states (..., n) after dt [s], fourth order.
+
+    The rates (..., n) with which it begins may be known.
+    """
+    k1 = system.dynamics(states, controls) if rates is None else rates
     k2 = system.dynamics(states + dt / 2 * k1, controls)
     k3 = system.dynamics(states + dt / 2 * k2, controls)
     k4 = system.dynamics(states + dt * k3, controls)

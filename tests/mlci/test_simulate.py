@@ -43,6 +43,13 @@ def test_error_falls_with_the_integrators_order(step, order, substeps):
     assert slope == pytest.approx(order, abs=0.15)
 
 
+def test_a_step_takes_rates_that_are_known():
+    control, rates = CONTROLS[0], PENDULUM.dynamics(START, CONTROLS[0])
+    step = rk4_step(PENDULUM, START, control, 0.1)
+    np.testing.assert_array_equal(rk4_step(PENDULUM, START, control, 0.1, rates), step)
+    assert not np.allclose(rk4_step(PENDULUM, START, control, 0.1, 0 * rates), step)
+
+
 @pytest.mark.parametrize("integrator", [EULER, RK4], ids=["Euler", "Runge-Kutta"])
 def test_jacobians_of_a_step_are_those_that_differences_give(integrator):
     leg, rng, dt = TelescopingPendulum(), np.random.default_rng(1), 0.3
