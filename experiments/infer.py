@@ -41,6 +41,7 @@ from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
 from mlci.inference import Inference
 from mlci.plot import draw_map, png
+from mlci.recordings.files import user_path
 from mlci.recordings.plausibility import Plausibility, summary
 from mlci.recordings.read import Readings
 from mlci.recordings.recording import Remark, shown_path
@@ -76,7 +77,9 @@ def infer(settings: RecordedSettings) -> int:
     begin("reading files")
     readings = read_recordings(settings)
     demonstrations, problems, notes = readings
-    calibration = _exported_calibration(settings, notes) if settings.inference.calibrate else None
+    calibration = None
+    if settings.inference.calibrate and demonstrations:
+        calibration = _exported_calibration(settings, notes)
     begin("")
     for problem in problems:
         complain(f"not used: {problem}")
@@ -123,7 +126,7 @@ def _exported_calibration(settings: RecordedSettings, notes: list[Remark]) -> Ca
     paths = [given] if isinstance(given, str) else given
     if len(paths) != 1:
         return None
-    folder = Path(paths[0]) / CALIBRATION
+    folder = user_path(paths[0]) / CALIBRATION
     if not folder.is_dir():
         return None
     calibration = exported_calibration(settings, Store(folder))

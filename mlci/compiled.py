@@ -52,7 +52,7 @@ class Compiled:
             with _told(function):
                 try:
                     self._machine_code = compile_it(self.signature, cache=True, **options)(function)
-                except RuntimeError:  # no folder can be written to
+                except (RuntimeError, OSError):  # no folder can be written to, or its disk is full
                     self._machine_code = compile_it(self.signature, **options)(function)
         return self._machine_code
 

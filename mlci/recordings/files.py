@@ -45,6 +45,15 @@ FORMATS = {
 }
 
 
+def user_path(given: str | Path) -> Path:
+    """A path as a person gives it, in which `~` stands for the home folder.
+
+    Raises:
+        RuntimeError: it begins with the home of nobody.
+    """
+    return Path(given).expanduser()
+
+
 def find_files(paths: Sequence[str | Path]) -> tuple[dict[Path, bool], list[Remark]]:
     """The files that paths stand for, each once; a problem for a path that stands for none.
 
@@ -58,7 +67,7 @@ def find_files(paths: Sequence[str | Path]) -> tuple[dict[Path, bool], list[Rema
     for given in paths:
         path = Path(given)
         try:
-            path = path.expanduser()
+            path = user_path(given)
             inside = _inside(path)
         except (OSError, ValueError, RuntimeError) as error:
             problems.append(Remark(shown_path(path), f"cannot be looked into ({error})"))

@@ -416,9 +416,10 @@ def test_status_tells_why_not(
 
 @pytest.mark.parametrize("words", [[], ["inference.calibrate=false"], ["inference=paper"]])
 def test_infer_on_a_points_recorded_files_gives_its_ranking_back(
-    tmp_path: Path, look, words: list[str]
+    tmp_path: Path, look, monkeypatch: pytest.MonkeyPatch, words: list[str]
 ) -> None:
     """With goals that are ranges, which the ends of the paths do not tell."""
+    monkeypatch.setenv("HOME", str(tmp_path))
     of_point = [word for word in TINY if not word.startswith("inference")]
     goal = "tasks.goal=[0.6,null]"
     point = computed(read_config(composed(*of_point, goal, *words))[0], tmp_path)
@@ -432,7 +433,7 @@ def test_infer_on_a_points_recorded_files_gives_its_ranking_back(
     assert (folder / "calibration").exists() == (not words)
     model = ["system=double_integrator", "dt=0.5", "actions=3", "grid.shape=[12,8]"]
     done = run_here(
-        infer.main, f"demonstrations={folder}", f"results={tmp_path / 'else'}", *model, *words,
+        infer.main, "demonstrations=~/recorded", f"results={tmp_path / 'else'}", *model, *words,
         folder=tmp_path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

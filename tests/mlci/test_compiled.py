@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -76,6 +78,19 @@ def test_where_nothing_can_be_kept_it_still_runs(
     from numba.core import caching
 
     monkeypatch.setattr(caching.CacheImpl, "_locator_classes", [])
+    assert loops.square(3.0) == 9
+    assert not list(tmp_path.rglob("*.nbc"))
+
+
+def test_a_disk_that_is_full_stops_nothing(
+    monkeypatch: pytest.MonkeyPatch, loops: ModuleType, tmp_path: Path
+) -> None:
+    from numba.core import caching
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
     assert loops.square(3.0) == 9
     assert not list(tmp_path.rglob("*.nbc"))
 
