@@ -29,6 +29,7 @@ V       values                safe set's value function                  unit of
 
 from typing import TYPE_CHECKING, Any
 
+from mlci.balls import Ball
 from mlci.calibration import Calibration, calibrate
 from mlci.causal_entropy import CausalEntropy
 from mlci.crossings import Crossing
@@ -39,8 +40,10 @@ from mlci.first_exit import FirstExit
 from mlci.fixed_horizon import FixedHorizon
 from mlci.forecasts import ForecastMap
 from mlci.grids import Grid
+from mlci.half_spaces import HalfSpace
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
+from mlci.predicates import InTaskSpace, Predicate
 from mlci.preparation import PreparedInference, infer, prepare
 from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
@@ -65,6 +68,7 @@ if TYPE_CHECKING:
     from mlci.recordings.write import write_demonstration
 
 __all__ = [
+    "Ball",
     "Box",
     "Calibration",
     "CausalEntropy",
@@ -77,8 +81,11 @@ __all__ = [
     "ForecastMap",
     "FunctionSystem",
     "Grid",
+    "HalfSpace",
+    "InTaskSpace",
     "Inference",
     "Pendulum",
+    "Predicate",
     "PreparedInference",
     "Regions",
     "SafeSet",

@@ -7,7 +7,9 @@ last. Both are exact on the polyline through the samples.
 A *stay* is a longest interval of time in which the path is in the interior of a region. Its depth
 is the largest share of the region's width that the path keeps to the nearest side, in the dimension
 in which it keeps least: 0 at a side, 0.5 in the middle. A side at the border of the state space,
-which no path can cross, does not count: at the border itself a path is deepest.
+which no path can cross, does not count: at the border itself a path is deepest. In a region that
+is no box the depth is half the share of its deepest level (`mlci.shapes`) that the path reaches,
+looked for in 33 places a chord; a predicate of truth values is equally deep, 0.5, everywhere.
 """
 
 from __future__ import annotations
@@ -18,9 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mlci.membership import points_of
 from mlci.regions import Regions
 from mlci.spaces import Bools, Floats, Ints
+from mlci.spans import Spans
 
+_PLACES = 33  # along a part of a chord, at which depth in a region that is no box is looked for
+_TINY = 1e-300  # a depth that keeps a quotient finite
 _SAME_MOMENT = 1e-9  # of a duration: stays so near to each other are one
 
 
@@ -118,6 +124,12 @@ def stays(regions: Regions, path: ArrayLike, time: ArrayLike, unit: Floats | Non
     numbers, lower, upper = regions.images
     region, corners = numbers[image], (lower[image], upper[image])
     depth = _depth(regions, starts[chord], steps[chord], corners, (enter, leave), unit)
+    for i in np.flatnonzero(~regions.are_boxes).tolist():
+        parts = regions.shape(i).spans(regions.space, starts, steps)
+        deep = _depth_by_level(regions, i, starts, steps, parts, unit)
+        columns = chord, region, enter, leave, depth
+        more = parts.chord, np.full(len(deep), i), parts.enter, parts.leave, deep
+        chord, region, enter, leave, depth = map(np.append, columns, more)
     lasts = np.diff(time)
     begin, end = (time[chord] + share * lasts[chord] for share in (enter, leave))
     order = np.lexsort([begin, region])
@@ -128,6 +140,20 @@ def stays(regions: Regions, path: ArrayLike, time: ArrayLike, unit: Floats | Non
         return Stays(region, begin, end, depth)
     last = np.append(first[1:], len(region)) - 1
     return Stays(region[first], begin[first], end[last], np.maximum.reduceat(depth, first))
+
+
+def _depth_by_level(
+    regions: Regions, index: int, starts: Floats, steps: Floats, parts: Spans, unit: Floats | None
+) -> Floats:
+    """(E,) how deep parts of chords get into a region that is no box, see the module's head."""
+    space, shape = regions.space, regions.shape(index)
+    share = np.linspace(parts.enter, parts.leave, _PLACES, axis=1)[..., None]
+    states = starts[parts.chord][:, None] + share * steps[parts.chord][:, None]
+    deepest = -np.min(shape.level(space, states), axis=1, initial=0.0)
+    if unit is not None:
+        return np.asarray(deepest / np.max(unit[np.isfinite(regions.lower[index])]))
+    inner = shape.level(space, points_of(space, shape))
+    return np.asarray(deepest / (-2 * np.min(inner, initial=-np.max(deepest, initial=_TINY))))
 
 
 def _depth(

@@ -148,7 +148,7 @@ def solve_safe_set(
     if not tolerance > 0:
         raise ValueError(f"a tolerance must be positive, not {tolerance}")
     for i in range(len(constraints)):
-        deepest = np.min(constraints.space.signed_distance(grid.centers, constraints.box(i)))
+        deepest = np.min(constraints.shape(i).level(constraints.space, grid.centers))
         if not -np.inf < deepest < 0:
             raise ValueError(
                 f"region {i} must hold at least one cell centre of a {list(grid.shape)} grid and "

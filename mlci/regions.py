@@ -5,7 +5,7 @@ A path violates a region when it meets the region's interior: to touch an edge i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,48 +13,51 @@ import numpy as np
 import scipy  # loads scipy.sparse when it is first used
 from numpy.typing import ArrayLike
 
+from mlci.box_relations import boxes_inside, boxes_overlap, check_corners
 from mlci.chords import Boxes
 from mlci.grids import Grid
+from mlci.images import images
+from mlci.membership import covered_by_points, shared_by_points
+from mlci.shapes import Cuboid, Shape, as_shape, checked_hull
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
+
+BoxRelation = Callable[["Regions", "Regions"], Bools]
+ShapeRelation = Callable[[StateSpace, Shape, Shape], bool]
 
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """C boxes in a state space; they may overlap, need not cover it, and there may be none.
+    """C regions of a state space; they may overlap, need not cover it, and there may be none.
 
     Attributes:
         space: the state space.
-        lower: (C, n) lower corners, -inf where a dimension is free.
+        lower: (C, n) lower corners of the regions, or of their hulls where they are no boxes; -inf
+            where a dimension is free.
         upper: (C, n) upper corners, +inf where a dimension is free.
         names: (C,) name of each region, all different; by default its number, from "0".
+        shapes: (C,) what each region is; None for the box between its corners.
 
     Raises:
         ValueError: corners of the wrong shape, an empty box, a side with one infinite end, or names
-            that are too few, too many or not different.
+            or shapes that are too few, too many or not different.
     """
 
     space: StateSpace
     lower: Floats
     upper: Floats
     names: tuple[str, ...] = ()
+    shapes: tuple[Shape | None, ...] = ()
 
     def __post_init__(self) -> None:
         lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
-        n = self.space.dimension
-        if lower.ndim != 2 or lower.shape != upper.shape or lower.shape[1] != n:
-            raise ValueError(
-                f"regions need corners of shape (C, {n}), not {lower.shape} and {upper.shape}"
-            )
-        bad = ~np.all((lower < upper) & (np.isfinite(lower) == np.isfinite(upper)), axis=1)
-        if bad.any():
-            first = int(np.argmax(bad))
-            raise ValueError(
-                f"region {first} needs lower < upper and both ends finite or neither: "
-                f"{lower[first].tolist()} to {upper[first].tolist()}"
-            )
+        check_corners(self.space, lower, upper)
         names = tuple(self.names) or _numbers(len(lower))
         if len(names) != len(lower) or len(set(names)) < len(names):
             raise ValueError(f"{len(lower)} regions need as many different names, not {names}")
+        shapes = tuple(self.shapes) or (None,) * len(lower)
+        if len(shapes) != len(lower):
+            raise ValueError(f"{len(lower)} regions need as many shapes, not {len(shapes)}")
+        object.__setattr__(self, "shapes", shapes)
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
         object.__setattr__(self, "names", names)
@@ -72,6 +75,22 @@ class Regions:
         return cls(space, lower, upper, tuple(names))
 
     @classmethod
+    def from_shapes(
+        cls, space: StateSpace, shapes: Iterable[Shape | Box], names: Sequence[str] = ()
+    ) -> Regions:
+        """The regions listed, boxes or other shapes, in their order.
+
+        Raises:
+            ValueError: a shape that cannot be one of this space, or lies outside its bounds.
+        """
+        parts = [as_shape(shape) for shape in shapes]
+        hulls = [checked_hull(space, part, f"region {k}") for k, part in enumerate(parts)]
+        corners = np.array([(hull.lower, hull.upper) for hull in hulls])
+        lower, upper = np.moveaxis(corners.reshape(-1, 2, space.dimension), 1, 0)
+        kinds = tuple(None if isinstance(part, Cuboid) else part for part in parts)
+        return cls(space, lower, upper, tuple(names), kinds)
+
+    @classmethod
     def from_grid(cls, space: StateSpace, shape: Sequence[int | None]) -> Regions:
         """Equal cells over any subset of the dimensions: a None in `shape` leaves one free."""
         grid = Grid(space, tuple(1 if count is None else count for count in shape))
@@ -80,8 +99,17 @@ class Regions:
         return cls(space, np.where(free, -np.inf, lower), np.where(free, np.inf, upper))
 
     def box(self, index: int) -> Box:
-        """Region `index` as a box."""
+        """Region `index` as a box; its hull if it is none."""
         return Box(self.lower[index], self.upper[index])
+
+    def shape(self, index: int) -> Shape:
+        """Region `index` as a shape."""
+        return self.shapes[index] or Cuboid(self.box(index))
+
+    @cached_property
+    def are_boxes(self) -> Bools:
+        """(C,) which regions are boxes."""
+        return np.array([shape is None for shape in self.shapes], dtype=bool)
 
     def joined(self, other: Regions) -> Regions:
         """These regions, then the other's.
@@ -94,6 +122,7 @@ class Regions:
             np.concatenate([self.lower, other.lower]),
             np.concatenate([self.upper, other.upper]),
             () if numbered else self.names + other.names,
+            self.shapes + other.shapes,
         )
 
     def mask(self, names: Iterable[str]) -> Bools:
@@ -111,62 +140,67 @@ class Regions:
         """The regions where mask (C,) is true, in their order."""
         chosen = as_mask(mask, len(self))
         names = tuple(name for name, is_in in zip(self.names, chosen, strict=True) if is_in)
-        return Regions(self.space, self.lower[chosen], self.upper[chosen], names)
+        shapes = tuple(each for each, is_in in zip(self.shapes, chosen, strict=True) if is_in)
+        return Regions(self.space, self.lower[chosen], self.upper[chosen], names, shapes)
 
     def signed_distance(self, states: ArrayLike) -> Floats:
         """dist_K of the union (...,) at states (..., n): below 0 inside some region.
 
-        +inf everywhere if there is no region.
+        +inf everywhere if there is no region. Of a region that is no box it is the level of
+        `mlci.shapes`: of the same sign, and no more than the distance.
+
+        Raises:
+            ValueError: a region that knows no distance, such as a predicate without a steepness.
         """
         nowhere = np.full(np.shape(states)[:-1], np.inf)
-        each = [self.space.signed_distance(states, self.box(i)) for i in range(len(self))]
+        for name, shape in zip(self.names, self.shapes, strict=True):
+            if shape is not None and not shape.has_distance:
+                raise ValueError(
+                    f"region {name} knows what is inside, but not how far away it is, which a safe "
+                    "set needs: give its `steepness`"
+                )
+        states = np.asarray(states, dtype=float)
+        each = [self.shape(i).level(self.space, states) for i in range(len(self))]
         return np.min([nowhere, *each], axis=0)
 
     def inside(self, other: Regions) -> Bools:
         """(C,) which regions lie entirely in one region of `other` (to 1e-9 of the bounds).
 
         What a region holds beyond the bounds of the state space does not count, and one that holds
-        nothing else is inside nothing.
+        nothing else is inside nothing. Where one of two is no box, points of the region tell, see
+        `membership`.
         """
-        widths, periodic = self.space.bounds.widths, self.space.periodic
-        slack = 1e-9 * widths
-        mine, theirs = self._within_bounds(), other._within_bounds()
-        covered = np.zeros(len(self), dtype=bool)
-        for lower, upper in zip(*theirs, strict=True):
-            ahead = mine[0] - lower
-            ahead -= np.where(periodic, np.floor((ahead + slack) / widths) * widths, 0.0)
-            fits = (ahead >= -slack) & (ahead + mine[1] - mine[0] <= upper - lower + slack)
-            all_round = periodic & (upper - lower >= widths - slack)
-            covered |= np.all(fits | all_round, axis=1)
-        return covered & np.all(mine[1] - mine[0] > slack, axis=1)
+        if not (self.are_boxes.all() and other.are_boxes.all()):
+            return self._by_points(other, Regions.inside, covered_by_points)
+        return boxes_inside(self.space, self._corners, other._corners)
 
     def overlaps(self, other: Regions) -> Bools:
         """(C,) which regions share more than an edge with some region of `other`.
 
-        What is shared must be wider than 1e-9 of the bounds in each dimension.
+        What is shared must be wider than 1e-9 of the bounds in each dimension. Where one of two is
+        no box, points of both tell, see `membership`.
         """
-        widths, periodic = self.space.bounds.widths, self.space.periodic
-        slack = 1e-9 * widths
-        mine, theirs = self._within_bounds(), other._within_bounds()
-        shared = np.zeros(len(self), dtype=bool)
-        for lower, upper in zip(*theirs, strict=True):
-            # Two intervals overlap where one of them begins inside the other.
-            ahead, behind = lower - mine[0], mine[0] - lower
-            ahead -= np.where(periodic, np.floor((ahead + slack) / widths) * widths, 0.0)
-            behind -= np.where(periodic, np.floor((behind + slack) / widths) * widths, 0.0)
-            begins_in_mine = (ahead > -slack) & (ahead < mine[1] - mine[0] - slack)
-            begins_in_theirs = (behind > -slack) & (behind < upper - lower - slack)
-            if np.all(upper - lower > slack):
-                shared |= np.all(begins_in_mine | begins_in_theirs, axis=1)
-        return shared & np.all(mine[1] - mine[0] > slack, axis=1)
+        if not (self.are_boxes.all() and other.are_boxes.all()):
+            return self._by_points(other, Regions.overlaps, shared_by_points)
+        return boxes_overlap(self.space, self._corners, other._corners)
 
-    def _within_bounds(self) -> tuple[Floats, Floats]:
-        """Finite corners (C, n): cut to the bounds, and to one period where a region goes round."""
-        bounds, periodic = self.space.bounds, self.space.periodic
-        lower = np.where(periodic, self.lower, np.maximum(self.lower, bounds.lower))
-        upper = np.where(periodic, self.upper, np.minimum(self.upper, bounds.upper))
-        all_round = periodic & (upper - lower >= bounds.widths)
-        return np.where(all_round, bounds.lower, lower), np.where(all_round, bounds.upper, upper)
+    def _by_points(self, other: Regions, of_boxes: BoxRelation, of_shapes: ShapeRelation) -> Bools:
+        """(C,) which regions are so related to some region of `other`: boxes by their corners."""
+        mine, theirs = self.are_boxes, other.are_boxes
+        related = np.zeros(len(self), dtype=bool)
+        related[mine] = of_boxes(self.select(mine), other.select(theirs))
+        for i in np.flatnonzero(~related).tolist():
+            related[i] = any(
+                of_shapes(self.space, self.shape(i), other.shape(j))
+                for j in range(len(other))
+                if not (mine[i] and theirs[j])
+            )
+        return related
+
+    @property
+    def _corners(self) -> tuple[Floats, Floats]:
+        """The corners (C, n)."""
+        return self.lower, self.upper
 
     def violated_by(self, paths: ArrayLike) -> Bools:
         """D: which regions (..., C) a path (..., K+1, n) enters, tested on its whole polyline.
@@ -196,12 +230,28 @@ class Regions:
             (P, C) sparse boolean matrix.
         """
         tested = np.ones(len(starts), dtype=bool) if tested is None else tested
-        begins, region, *_ = self._boxes.hits(self.space.wrap(starts), steps, tested)
+        starts = self.space.wrap(starts)
+        begins, region, *_ = self._boxes.hits(starts, steps, tested)
         entered = np.ones(len(region), dtype=bool)
-        return scipy.sparse.csr_matrix((entered, region, begins), shape=(len(starts), len(self)))
+        hits = scipy.sparse.csr_matrix((entered, region, begins), shape=(len(starts), len(self)))
+        if self.are_boxes.all():
+            return hits
+        paths, (chords, n) = np.flatnonzero(tested), starts.shape[1:]
+        ends = starts[paths].reshape(-1, n), steps[paths].reshape(-1, n)
+        rows, columns = [], []
+        for i in np.flatnonzero(~self.are_boxes).tolist():
+            met = np.unique(self.shape(i).spans(self.space, *ends).chord // chords)
+            rows.append(paths[met])
+            columns.append(np.full(len(met), i))
+        row, column = np.concatenate(rows), np.concatenate(columns)
+        met = scipy.sparse.csr_matrix((np.ones(len(row), bool), (row, column)), shape=hits.shape)
+        return scipy.sparse.csr_matrix(hits + met)
 
     def chord_hits(self, starts: Floats, steps: Floats) -> tuple[Ints, Ints, Floats, Floats]:
-        """Pairs (chord, image) that meet, and shares of the chord between; starts wrapped."""
+        """Pairs (chord, image) that meet, and shares of the chord between; starts wrapped.
+
+        Of boxes alone.
+        """
         region, lower, upper = self.images
         each = Boxes.of(lower, upper, np.arange(len(region)))
         begins, image, enter, leave = each.hits(
@@ -217,27 +267,13 @@ class Regions:
 
     @cached_property
     def images(self) -> tuple[Ints, Floats, Floats]:
-        """The regions' copies, whole periods apart, that a wrapped chord can reach.
+        """The copies of boxes, whole periods apart, that a wrapped chord can reach.
 
         Returns their region numbers (I,) and corners (I, n).
         """
-        region, lower, upper = np.arange(len(self)), self.lower.copy(), self.upper.copy()
-        for d in np.flatnonzero(self.space.periodic):
-            period = self.space.bounds.widths[d]
-            free = upper[:, d] - lower[:, d] >= period
-            lower[free, d], upper[free, d] = -np.inf, np.inf
-            # Chords start in the bounds and are at most half a period long.
-            chords_from = self.space.bounds.lower[d] - period / 2
-            chords_to = self.space.bounds.upper[d] + period / 2
-            first = np.where(free, 0.0, np.ceil((chords_from - upper[:, d]) / period))
-            last = np.where(free, 0.0, np.floor((chords_to - lower[:, d]) / period))
-            copies = [(region[:0], lower[:0], upper[:0])]
-            for turns in np.arange(first.min(initial=0.0), last.max(initial=0.0) + 1):
-                wanted = (first <= turns) & (turns <= last)
-                shift = np.where(np.arange(self.space.dimension) == d, turns * period, 0.0)
-                copies.append((region[wanted], lower[wanted] + shift, upper[wanted] + shift))
-            region, lower, upper = map(np.concatenate, zip(*copies, strict=True))
-        return region, lower, upper
+        boxes = np.flatnonzero(self.are_boxes)
+        copy, lower, upper = images(self.space, self.lower[boxes], self.upper[boxes])
+        return boxes[copy], lower, upper
 
 
 def _numbers(count: int) -> tuple[str, ...]:
