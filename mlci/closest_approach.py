@@ -6,6 +6,10 @@ its tangents bound it from below.
 
 The boxes of K are arrays (C, n): their centres, and their half widths, which are infinite in a
 dimension that the distance does not depend on. A period (n,) is 0 where a dimension does not wrap.
+
+The level of a shape that is no box changes by no more than the length of a chord: half the sum of
+the levels at its ends, less half its length, bounds it from below. Chords that matter are cut into
+8 parts.
 """
 
 from __future__ import annotations
@@ -17,38 +21,50 @@ from functools import cached_property
 import numpy as np
 
 from mlci.compiled import compiled
+from mlci.membership import deepest_level
 from mlci.regions import Regions
 from mlci.spaces import Bools, Floats, middle_and_half
 
+_PARTS = 8  # of a chord, between whose ends the level of a shape is bounded
 _CUTS = 4  # tangents that close in on the least distance along a chord
 _TURNED = 1e-9  # of a period that rounding may move an end by
 
 
 @dataclass(frozen=True, eq=False)
-class Boxes:
-    """The boxes of K as the compiled loops take them; see the module's head."""
+class KeepOut:
+    """K: its boxes as the compiled loops take them, and its other shapes; see the module's head."""
 
     centers: Floats
     halves: Floats
     period: Floats
+    others: Regions
 
     @classmethod
-    def of(cls, constraints: Regions) -> Boxes:
-        """The boxes of some regions."""
-        space = constraints.space
-        pairs = [middle_and_half(constraints.box(region)) for region in range(len(constraints))]
+    def of(cls, constraints: Regions) -> KeepOut:
+        """K of some regions."""
+        space, are_boxes = constraints.space, np.flatnonzero(constraints.are_boxes)
+        pairs = [middle_and_half(constraints.box(region)) for region in are_boxes.tolist()]
         centers, halves = np.array(pairs).reshape(-1, 2, space.dimension).transpose(1, 0, 2)
         covered = space.periodic & (2 * halves >= space.bounds.widths)
         return cls(
             np.ascontiguousarray(centers),
             np.where(covered, np.inf, halves),
             np.where(space.periodic, space.bounds.widths, 0.0),
+            constraints.select(~constraints.are_boxes),
         )
 
     @cached_property
     def counted(self) -> Bools:
         """Which dimensions (n,) the signed distance depends on."""
-        return np.asarray(np.any(np.isfinite(self.halves), axis=0))
+        finite = np.isfinite(np.concatenate([self.halves, self.others.lower]))
+        return np.asarray(np.any(finite, axis=0))
+
+    @cached_property
+    def depth(self) -> float:
+        """How far inside K the signed distance can be."""
+        space, numbers = self.others.space, range(len(self.others))
+        depths = [-deepest_level(space, self.others.shape(i)) for i in numbers]
+        return float(np.max([*np.min(self.halves, axis=1), *depths]))
 
     def approach(
         self,
@@ -70,6 +86,29 @@ class Boxes:
         boxes = self.centers, self.halves, self.period, self.counted
         by_dimension = (each.T for each in (*samples, *rates))
         _approach(*boxes, *by_dimension, step, distance, least)
+        if len(self.others):
+            distance[:] = np.minimum(distance, self.others.signed_distance(samples[1]))
+            self._approach_others(samples, rates, step, least)
+
+    def _approach_others(
+        self,
+        samples: tuple[Floats, Floats],
+        rates: tuple[Floats, Floats],
+        step: float,
+        least: Floats,
+    ) -> None:
+        """Lower least (B,) by what is no box; arguments as in `approach`."""
+        counted = self.counted
+        chord = self.others.space.difference(samples[1], samples[0])
+        change = np.linalg.norm((rates[1] - rates[0])[:, counted], axis=1)
+        bow, length = step / 4 * change, np.linalg.norm(chord[:, counted], axis=1)
+        ends = [self.others.signed_distance(sample) for sample in samples]
+        near = np.flatnonzero((ends[0] + ends[1] - length) / 2 - bow < least)
+        share = np.linspace(0, 1, _PARTS + 1)[:, None]
+        places = samples[0][near, None] + share * chord[near, None]
+        level = self.others.signed_distance(places)
+        between = (level[:, 1:] + level[:, :-1] - length[near, None] / _PARTS) / 2
+        least[near] = np.minimum(least[near], np.min(between, axis=1) - bow[near])
 
 
 @compiled("UniTuple(f8, 2)(f8[::1], f8[::1], f8[::1])")
@@ -151,7 +190,7 @@ def _approach(
     distance: Floats,
     least: Floats,
 ) -> None:
-    """`Boxes.approach` as loops, over states (n, B)."""
+    """`KeepOut.approach` of the boxes as loops, over states (n, B)."""
     n = len(period)
     first, last, chord, place = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for b in range(len(least)):

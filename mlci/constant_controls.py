@@ -25,7 +25,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mlci.closest_approach import Boxes
+from mlci.closest_approach import KeepOut
 from mlci.grids import Grid
 from mlci.reachability import SafeSet
 from mlci.regions import Regions
@@ -101,9 +101,9 @@ def tabulate_escapes(
     """
     check_affine(system)
     step = _step_for(system, grid, constraints, horizon)
-    boxes, distances = Boxes.of(constraints), constraints.signed_distance(grid.centers)
-    depth = np.max(np.min(boxes.halves, axis=1))
-    enough = _ENOUGH * max(depth, np.max(grid.widths[boxes.counted], initial=0.0))
+    keep_out, distances = KeepOut.of(constraints), constraints.signed_distance(grid.centers)
+    widest = np.max(grid.widths[keep_out.counted], initial=0.0)
+    enough = _ENOUGH * max(keep_out.depth, widest)
     values, known, low = np.full(grid.size, enough), np.zeros(grid.size, bool), distances < enough
     while len(new := np.flatnonzero(_with_neighbours(low, grid) & ~known)):
         v = escape_value(system, constraints, grid.centers[new], horizon, step, enough)
@@ -141,7 +141,7 @@ def escape_value(
         step: time between the samples of the motions [s]; divides the horizon.
         enough: once one control achieves it, the others are not tried.
     """
-    steps, boxes = step_count(horizon, step), Boxes.of(constraints)
+    steps, keep_out = step_count(horizon, step), KeepOut.of(constraints)
     sliding, parts = _Sliding(system), [np.empty(0)]
     for first in range(0, len(states), _AT_ONCE):
         part = np.asfortranarray(states[first : first + _AT_ONCE], dtype=float)
@@ -150,14 +150,14 @@ def escape_value(
         for controls in system.control_box.vertices()[order]:
             hopeful = np.flatnonzero(best < np.minimum(distances, enough))
             motions = part[hopeful], controls[hopeful], distances[hopeful], best[hopeful]
-            best[hopeful] = _held(sliding, boxes, *motions, steps, step)
+            best[hopeful] = _held(sliding, keep_out, *motions, steps, step)
         parts.append(best)
     return np.concatenate(parts)
 
 
 def _step_for(system: System, grid: Grid, constraints: Regions, horizon: float) -> float:
     """The step [s] at which the bow of a motion in a step is at most `_LOSS` of a cell."""
-    counted = Boxes.of(constraints).counted
+    counted = KeepOut.of(constraints).counted
     fastest = 0.0
     for first in range(0, grid.size, _AT_ONCE):
         states = grid.centers[first : first + _AT_ONCE]
@@ -185,7 +185,7 @@ def _promising(system: _Sliding, constraints: Regions, states: Floats, ahead: fl
 
 def _held(
     system: _Sliding,
-    boxes: Boxes,
+    keep_out: KeepOut,
     states: Floats,
     controls: Floats,
     distances: Floats,
@@ -208,7 +208,7 @@ def _held(
         then = np.asfortranarray(system.clip(rk4_step(system, now, control, step, drift)))
         drift = np.asfortranarray(system.dynamics(then, control))
         rates_then = system.stopped(drift, then)
-        boxes.approach((now, then), (rates, rates_then), step, distance, least)
+        keep_out.approach((now, then), (rates, rates_then), step, distance, least)
         now, rates = then, rates_then
         if k % _STEPS_BETWEEN == 0:
             moves, counts = np.any(rates != 0, axis=1), least > best[row]

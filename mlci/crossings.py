@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.membership import points_of
+from mlci.membership import deepest_level
 from mlci.regions import Regions
 from mlci.spaces import Bools, Floats, Ints
 from mlci.spans import Spans
@@ -152,8 +152,8 @@ def _depth_by_level(
     deepest = -np.min(shape.level(space, states), axis=1, initial=0.0)
     if unit is not None:
         return np.asarray(deepest / np.max(unit[np.isfinite(regions.lower[index])]))
-    inner = shape.level(space, points_of(space, shape))
-    return np.asarray(deepest / (-2 * np.min(inner, initial=-np.max(deepest, initial=_TINY))))
+    width = 2 * max(-deepest_level(space, shape), np.max(deepest, initial=_TINY))
+    return np.asarray(deepest / width)
 
 
 def _depth(

@@ -36,6 +36,11 @@ def volume_share(space: StateSpace, shape: Shape) -> float:
     return float(inside * np.prod(box.widths / space.bounds.widths))
 
 
+def deepest_level(space: StateSpace, shape: Shape) -> float:
+    """The lowest level of a shape within the bounds, below 0 unless it is too small for points."""
+    return float(np.min(shape.level(space, points_of(space, shape)), initial=0.0))
+
+
 def covered_by_points(space: StateSpace, shape: Shape, other: Shape) -> bool:
     """Whether another shape, its border included, holds all points of a shape that has some."""
     points = points_of(space, shape)
