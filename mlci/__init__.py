@@ -48,8 +48,12 @@ from mlci.preparation import PreparedInference, infer, prepare
 from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter
-from mlci.selection import Selection, select_constraints
-from mlci.sets import SetPosterior, infer_sets
+from mlci.selection import select_constraints, select_regions
+from mlci.set_evidence import SetEvidence
+from mlci.set_inference import infer_sets
+from mlci.set_sampling import sample_sets
+from mlci.set_search import Selection
+from mlci.sets import SetPosterior, SetPrior, enumerate_sets
 from mlci.simulate import rollout
 from mlci.spaces import Box, StateSpace
 from mlci.system_check import check_affine, check_system
@@ -91,7 +95,9 @@ __all__ = [
     "SafeSet",
     "SafetyFilter",
     "Selection",
+    "SetEvidence",
     "SetPosterior",
+    "SetPrior",
     "StateSpace",
     "System",
     "Table",
@@ -108,13 +114,16 @@ __all__ = [
     "demonstrate",
     "diagnose",
     "discretize",
+    "enumerate_sets",
     "infer",
     "infer_sets",
     "prepare",
     "read_demonstrations",
     "rollout",
+    "sample_sets",
     "sample_trials",
     "select_constraints",
+    "select_regions",
     "solve_safe_set",
     "write_demonstration",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,10 +80,9 @@ def credible_set(
     held = np.cumsum(probability[order])
     count = min(int(np.searchsorted(held, share - _ROUNDING)) + 1, len(order))
     regions = order[:count][order[:count] > 0] - 1
-    areas = [
-        Area(group, float(np.sum(posterior[group])), _hull(hypotheses, group))
-        for group in _joined(hypotheses, np.sort(regions))
-    ]
+    areas = joined_areas(
+        hypotheses, np.sort(regions), lambda group: float(np.sum(posterior[group]))
+    )
     return CredibleSet(
         share=share,
         regions=regions,
@@ -103,6 +103,22 @@ def neighbours(regions: Regions) -> scipy.sparse.csr_matrix:
         touches = np.all(gap <= slack, axis=1) & (np.sum(gap > -slack, axis=1) <= 1)
         rows.append(scipy.sparse.csr_matrix(touches))
     return scipy.sparse.vstack(rows, format="csr")
+
+
+def joined_areas(
+    hypotheses: Regions, numbers: Ints, probability: Callable[[Ints], float]
+) -> list[Area]:
+    """Some regions, joined with their neighbours among them, in order of their first regions.
+
+    Args:
+        hypotheses: the C regions.
+        numbers: (B,) numbers of the regions, ascending.
+        probability: of regions that are one area, by their numbers.
+    """
+    return [
+        Area(group, probability(group), _hull(hypotheses, group))
+        for group in _joined(hypotheses, numbers)
+    ]
 
 
 def _joined(hypotheses: Regions, numbers: Ints) -> list[Ints]:

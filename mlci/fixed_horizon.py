@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from mlci.joint_avoidance import joint_avoidance
+from mlci.joint_avoidance import log_avoidance_beside
 from mlci.merged_moves import MergedMoves
 from mlci.recursions import Leg, backward_pass, reachable_cells
-from mlci.spaces import Floats, Ints
+from mlci.spaces import Bools, Floats, Ints
 from mlci.tables import Table
 
 
@@ -84,16 +84,16 @@ class FixedHorizon:
         reachable = reachable_cells(self._leg[0], np.flatnonzero(self.table.start), self.steps)
         return backward_pass([self._leg], reachable, self._ends, start, regions)
 
-    def joint_avoidance_probabilities(self, start: int) -> Floats:
-        """alpha_ij (C, C): that it makes no move of region i nor of j.
+    def log_avoidance_beside(self, start: int, others: Bools) -> Floats:
+        """log alpha (C,) [nat]: that it makes no move of the regions of a mask (C,) nor of i.
 
         Raises:
             ValueError: no trajectory from there ends in a goal.
         """
         self._require_possible(np.array([start]))
         reachable = reachable_cells(self._leg[0], [start], self.steps)
-        count = len(self.table.regions)
-        return joint_avoidance([self._leg], reachable, self._ends, start, count)
+        log_z = float(self.log_z[0, start])
+        return log_avoidance_beside([self._leg], reachable, self._ends, start, log_z, others)
 
     @property
     def _ends(self) -> Ints:

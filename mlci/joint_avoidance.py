@@ -1,7 +1,8 @@
-"""The probability of avoiding two regions at once, which is not the product of that of each.
+"""The probability of avoiding several regions at once, which is not the product of that of each.
 
-Of the trajectories that avoid region i, some share avoids j too: alpha_ij = alpha_i alpha_(j|i),
-where alpha_(j|i) is that of the distribution whose moves do not cross i. Nothing is subtracted.
+Of the trajectories that avoid a set B, some share avoids i too: alpha_(B+i) = Z_B / Z alpha_(i|B),
+where Z_B and alpha_(i|B) are those of the distribution whose moves cross no region of B. So one
+recursion gives the probability of avoiding B together with each of all regions.
 """
 
 from __future__ import annotations
@@ -14,24 +15,23 @@ from mlci.recursions import Leg, backward_pass
 from mlci.spaces import Bools, Floats, Ints
 
 
-def joint_avoidance(
-    legs: Sequence[Leg], reachable: Bools, goal: Ints, start: int, regions: int
+def log_avoidance_beside(
+    legs: Sequence[Leg], reachable: Bools, goal: Ints, start: int, log_z: float, others: Bools
 ) -> Floats:
-    """alpha (C, C): the probability of crossing neither region i nor j, on the diagonal of one.
+    """log alpha (C,) [nat] of crossing neither some regions nor i; -inf where that is impossible.
 
     Args:
         legs: moves, and the steps from which and to which they are taken.
         reachable: (T+1, S) whether a cell can be occupied at a step.
         goal: (G,) goal cells.
         start: start cell, from which some goal can be reached.
-        regions: C.
+        log_z: log Z of the start, where nothing is forbidden [nat].
+        others: (C,) mask of the regions to avoid beside i; with i among them, it is alpha of these.
     """
-    _, alpha = backward_pass(legs, reachable, goal, start, regions)
-    joint = np.diag(alpha)
-    for i in np.flatnonzero(alpha[:-1]).tolist():
-        alone = np.arange(regions) == i
-        without = [(moves.under(alone), early, late) for moves, early, late in legs]
-        log_z, rest = backward_pass(without, reachable, goal, start, regions, skip=i + 1)
-        if log_z[0, start] > -np.inf:
-            joint[i, i + 1 :] = joint[i + 1 :, i] = alpha[i] * rest
-    return joint
+    without = [(moves.under(others), early, late) for moves, early, late in legs]
+    constrained, alpha = backward_pass(without, reachable, goal, start, len(others))
+    share = constrained[0, start] - log_z if np.any(others) else 0.0
+    if share == -np.inf:
+        return np.full(len(others), -np.inf)
+    with np.errstate(divide="ignore"):
+        return np.asarray(min(share, 0.0) + np.log(alpha))

@@ -15,7 +15,7 @@ import numpy as np
 
 from mlci.demonstrations import Task
 from mlci.end_moves import first_moves, last_moves, only_moves
-from mlci.joint_avoidance import joint_avoidance
+from mlci.joint_avoidance import log_avoidance_beside
 from mlci.merged_moves import MergedMoves
 from mlci.recursions import Leg, backward_pass, move_probabilities, reachable_cells
 from mlci.simulate import step_count
@@ -195,15 +195,17 @@ class TrajectoryDistribution:
         vars(self)["log_z"] = log_z  # it comes along
         return alpha
 
-    def joint_avoidance_probabilities(self) -> Floats:
-        """alpha_ij (C, C): the probability that a trajectory crosses neither region i nor j.
+    def log_avoidance_beside(self, others: Bools) -> Floats:
+        """log alpha (C,) [nat]: of crossing neither the regions of a mask (C,) nor i.
 
         Raises:
             ValueError: no trajectory reaches a goal.
         """
         self._require_possible("probabilities are not defined")
-        count = len(self.model.regions)
-        return joint_avoidance(self._legs, self.reachable, self.goal, self.start, count)
+        log_z = float(self.log_z[0, self.start])
+        return log_avoidance_beside(
+            self._legs, self.reachable, self.goal, self.start, log_z, others
+        )
 
     def violation_probabilities(self) -> Floats:
         """Phi_(i,T) = 1 - alpha_i (C,): the probability that a trajectory crosses region i."""

@@ -12,57 +12,17 @@ stops where the best of the rest would lower KL by no more than a threshold.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from mlci.first_exit import FirstExit
 from mlci.fixed_horizon import FixedHorizon
+from mlci.set_evidence import SetEvidence
+from mlci.set_search import Selection, search, without_needless
+from mlci.sets import SetPrior
 from mlci.spaces import Bools, Floats, Ints
 from mlci.tables import Table, TablePath
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-_TIE = 1e-9  # nat: decreases closer than this are equal, and the first hypothesis is taken
-
-
-@dataclass(frozen=True, eq=False)
-class Selection:
-    """Constraints in the order in which they were added.
-
-    Attributes:
-        names: (C,) names of the hypotheses.
-        added: (K,) those added, in order.
-        kl: (K+1,) divergence of the paths from the distribution: without constraints, and after
-            each [nat].
-        next_decrease: by how much the best of the rest would have lowered it, where nothing more
-            was added [nat]; 0 where none was left.
-    """
-
-    names: tuple[str, ...]
-    added: Ints
-    kl: Floats
-    next_decrease: float
-
-    @property
-    def mask(self) -> Bools:
-        """(C,) the hypotheses that were added, as `under` takes them."""
-        return np.isin(np.arange(len(self.names)), self.added)
-
-    def to_frame(self) -> pd.DataFrame:
-        """A row for each constraint in order: `hypothesis`, `decrease` of KL, and `kl` after it."""
-        import pandas as pd
-
-        return pd.DataFrame(
-            {
-                "hypothesis": [self.names[i] for i in self.added],
-                "decrease": -np.diff(self.kl),
-                "kl": self.kl[1:],
-            }
-        )
 
 
 def select_constraints(
@@ -73,6 +33,7 @@ def select_constraints(
     most: int | None = None,
     steps: int | None = None,
     prune: bool = False,
+    width: int = 1,
 ) -> Selection:
     """Add one hypothesis of a table after the other, as long as each explains enough.
 
@@ -85,6 +46,7 @@ def select_constraints(
             `mlci.first_exit`. A horizon is faster where there are many hypotheses.
         prune: drop in the end those without which KL would rise by no more than `least`, given all
             others: what was added early may be explained by what came later.
+        width: how many sets of each size a beam keeps; 1 is greedy.
 
     Raises:
         ValueError: no paths, a path that does not run from a start to its first goal by moves of
@@ -108,71 +70,55 @@ def select_constraints(
         now, each = mean_log_z(mask), np.eye(len(mask), dtype=bool)[candidates]
         return np.array([now - mean_log_z(mask | one) for one in each])
 
-    added, decrease, following = greedy(decreases, feasible, least, most)
+    added, decrease, following = search(decreases, feasible, least, most, width)
     if prune:
         added, decrease = without_needless(decreases, added, len(feasible), least)
     kl = _divergence(table, paths) + mean_log_z(np.zeros(len(feasible), dtype=bool))
-    return Selection(
-        tuple(table.regions), added, kl - np.cumsum(np.append(0.0, decrease)), following
-    )
+    return Selection(tuple(table.regions), added, decrease, following, kl)
 
 
-def greedy(
-    decreases: Callable[[Bools, Ints], Floats], feasible: Bools, least: float, most: int | None
-) -> tuple[Ints, Floats, float]:
-    """Add the hypothesis with the largest decrease, again and again.
-
-    Args:
-        decreases: by how much (L,) each of some candidates (L,) lowers what is to be lowered, given
-            a mask (C,) of those added.
-        feasible: (C,) the hypotheses that may be added.
-        least: the decrease below or at which it stops.
-        most: how many to add at most; None adds as many as there are.
-
-    Returns:
-        Those added (K,) in order, their decreases (K,), and the decrease of the next.
-    """
-    mask = np.zeros(len(feasible), dtype=bool)
-    added: list[int] = []
-    steps: list[float] = []
-    while len(candidates := np.flatnonzero(feasible & ~mask)):
-        decrease = decreases(mask, candidates)
-        best = int(np.argmax(decrease > np.max(decrease) - _TIE))
-        if decrease[best] <= least or len(added) == most:
-            return np.array(added, dtype=np.int64), np.array(steps), float(decrease[best])
-        mask[candidates[best]] = True
-        added.append(int(candidates[best]))
-        steps.append(float(decrease[best]))
-    return np.array(added, dtype=np.int64), np.array(steps), 0.0
-
-
-def without_needless(
-    decreases: Callable[[Bools, Ints], Floats], added: Ints, hypotheses: int, least: float
-) -> tuple[Ints, Floats]:
-    """Drop one after the other of what was added, as long as it costs no more than `least`.
+def select_regions(
+    evidence: SetEvidence,
+    names: Sequence[str],
+    least: float = 0.1,
+    *,
+    prior: SetPrior | None = None,
+    most: int | None = None,
+    prune: bool = False,
+    width: int = 1,
+) -> Selection:
+    """Add one region of a tabular model after the other, as long as each explains enough.
 
     Args:
-        decreases: as of `greedy`.
-        added: (K,) numbers of hypotheses.
-        hypotheses: C.
-        least: the rise above which a hypothesis is kept.
+        evidence: of the demonstrations, for sets of the regions.
+        names: (C,) of the regions.
+        least: as of `select_constraints`.
+        prior: adds to what a region explains the log odds of the set with it against that without
+            it, a share of each demonstration; so that `least=0` stops where the posterior of the
+            set would fall. None adds nothing.
+        most: as of `select_constraints`.
+        prune: likewise.
+        width: likewise.
 
-    Returns:
-        Those kept (K',) in their order, and the decrease (K',) that each brings after those before.
+    Raises:
+        ValueError: no demonstrations.
     """
+    count = len(evidence.avoidance)
+    if not count:
+        raise ValueError("regions are selected by demonstrations, and there are none")
 
-    def decrease(others: list[int], candidate: int) -> float:
-        mask = np.isin(np.arange(hypotheses), others)
-        return float(decreases(mask, np.array([candidate]))[0])
+    def decreases(mask: Bools, candidates: Ints) -> Floats:
+        gain = evidence.beside(mask)[candidates]
+        now = evidence.gain(mask)
+        if prior is not None:
+            gain, now = gain + prior.log_beside(mask)[candidates], now + prior.log(mask)
+        with np.errstate(invalid="ignore"):  # what is certain already is not made more so
+            return np.where(gain == now, 0.0, gain - now) / count
 
-    kept = added.tolist()
-    while kept:
-        rises = [decrease([other for other in kept if other != i], i) for i in kept]
-        if min(rises) > least:
-            break
-        del kept[int(np.argmin(rises))]
-    steps = [decrease(kept[:k], kept[k]) for k in range(len(kept))]
-    return np.array(kept, dtype=np.int64), np.array(steps)
+    added, decrease, following = search(decreases, evidence.feasible, least, most, width)
+    if prune:
+        added, decrease = without_needless(decreases, added, evidence.regions, least)
+    return Selection(tuple(names), added, decrease, following)
 
 
 def _starts(table: Table, paths: Sequence[TablePath], steps: int | None) -> Ints:

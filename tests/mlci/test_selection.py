@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from toy_tables import grid_world, published_grid
 
+from mlci.credible_sets import neighbours
+from mlci.demonstrations import Demonstration
 from mlci.first_exit import FirstExit
-from mlci.selection import select_constraints
+from mlci.grids import Grid
+from mlci.preparation import infer
+from mlci.regions import Regions
+from mlci.selection import select_constraints, select_regions
+from mlci.set_evidence import SetEvidence
+from mlci.sets import SetPrior, enumerate_sets
+from mlci.systems import Pendulum
 from mlci.tables import Table, TablePath, TableRegion
+from mlci.tabular import action_grid, discretize
 
 # Scobee and Sastry's demonstration, and KL after each constraint that their code adds.
 ACTIONS = [2, 2, 2, 2, 2, 1, 2, 1, 7, 7, 7, 7, 7, 7]
@@ -162,3 +173,93 @@ def test_pruning_keeps_what_is_needed() -> None:
     for i in pruned.added:
         rest = pruned.mask & (np.arange(len(pruned.mask)) != i)
         assert divergence(table.under(rest), paths) > full + 0.02
+
+
+@pytest.mark.parametrize("steps", [None, 1])
+def test_a_beam_meets_a_pair_without_the_best_single_one(steps: int | None) -> None:
+    """Moves of weights 1, 2, 2, 3, 3 lead to the goal, and the path takes the first. The heaviest
+    hypothesis is in no pair that leaves the path alone, as the other two do."""
+    moves = {"middle": [3, 4], "left": [1, 3], "right": [2, 4]}
+    regions = {name: TableRegion(actions=actions) for name, actions in moves.items()}
+    reward = np.log([[1.0, 2.0, 2.0, 3.0, 3.0]])
+    table = Table.from_arrays([[1] * 5, [-1] * 5], reward, 0, 1, regions)
+    path = table.path(0, [0])
+    greedy = select_constraints(table, [path], steps=steps, most=2)
+    assert greedy.to_frame()["hypothesis"].tolist() == ["middle", "left"]
+    beam = select_constraints(table, [path], steps=steps, most=2, width=3)
+    np.testing.assert_allclose(greedy.kl, np.log([11, 5, 3]), atol=1e-12)
+    np.testing.assert_allclose(beam.kl, np.log([11, 6, 1]), atol=1e-12)
+    assert beam.to_frame()["hypothesis"].tolist() == ["left", "right"]
+
+
+def test_a_beam_as_wide_as_all_sets_finds_the_best_of_each_size() -> None:
+    table, paths = small()
+    feasible = ~np.any([table.crossed_by(path) for path in paths], axis=0)
+    for size in (1, 2, 3):
+        every = [
+            divergence(table.under(np.isin(np.arange(16), one)), paths)
+            for one in combinations(np.flatnonzero(feasible), size)
+        ]
+        wide = select_constraints(table, paths, least=-np.inf, most=size, width=1000)
+        assert wide.kl[-1] == pytest.approx(min(every), abs=1e-12)
+        assert len(wide.added) == size
+
+
+def rectangle_world() -> tuple[SetEvidence, Regions]:
+    """Two paths that swing a pendulum, and the evidence for sets of 30 regions."""
+    system = Pendulum()
+    regions = Regions.from_grid(system.space, (6, 5))
+    grid, actions = Grid(system.space, (20, 20)), action_grid(system, 9)
+    model = discretize(system, grid, actions, 0.25, regions)
+    paths = [[[0.5, 0.1], [2.0, 1.0], [3.0, 0.2]], [[4.0, 0.1], [2.5, -1.0], [1.0, -0.2]]]
+    demonstrations = [Demonstration.from_path(path, 1.5) for path in paths]
+    inference = infer(model, demonstrations)
+    return SetEvidence.of(model, demonstrations, inference), regions
+
+
+def test_regions_of_a_model_are_added_while_they_gain() -> None:
+    evidence, regions = rectangle_world()
+    selection = select_regions(evidence, regions.names, least=0.02)
+    assert len(selection.added) >= 2
+    mask = np.zeros(30, dtype=bool)
+    for k, i in enumerate([*selection.added, -1]):
+        rest = np.flatnonzero(evidence.feasible & ~mask)
+        after = [evidence.gain(mask | (np.arange(30) == j)) for j in rest]
+        rise = (np.max(after) - evidence.gain(mask)) / 2  # for each demonstration
+        if i < 0:
+            assert selection.next_decrease == pytest.approx(rise, abs=1e-12)
+            assert rise <= 0.02
+        else:
+            assert i == rest[np.argmax(after)]
+            assert selection.decrease[k] == pytest.approx(rise, abs=1e-12)
+            mask[i] = True
+    assert np.isnan(selection.kl).all()
+    assert not np.any(evidence.violated[:, selection.added])
+
+
+def test_with_a_prior_it_climbs_the_posterior() -> None:
+    evidence, regions = rectangle_world()
+    prior = SetPrior((0.5, 0.3, 0.2), adjacency=1.0, neighbours=neighbours(regions))
+    wide = select_regions(evidence, regions.names, 0.0, prior=prior, width=500)
+    exact = enumerate_sets(evidence, prior)
+    assert tuple(sorted(wide.added)) == exact.most_probable()
+    without = exact.weight[~exact.members.any(axis=1)][0]
+    assert np.sum(wide.decrease) * 2 == pytest.approx(exact.weight.max() - without, abs=1e-10)
+
+
+def test_pruned_regions_are_explained_by_others() -> None:
+    evidence, regions = rectangle_world()
+    full = select_regions(evidence, regions.names, least=0.0)
+    pruned = select_regions(evidence, regions.names, least=0.0, prune=True)
+    assert set(pruned.added) <= set(full.added)
+    for i in pruned.added:
+        rest = pruned.mask & (np.arange(30) != i)
+        assert evidence.gain(pruned.mask) > evidence.gain(rest)
+
+
+def test_what_cannot_be_selected_by_is_refused() -> None:
+    evidence, regions = rectangle_world()
+    with pytest.raises(ValueError, match="at least one set, not 0"):
+        select_regions(evidence, regions.names, width=0)
+    with pytest.raises(ValueError, match="selected by demonstrations, and there are none"):
+        select_regions(evidence.of_first(0), regions.names)

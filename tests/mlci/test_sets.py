@@ -1,53 +1,124 @@
-"""Belief over sets against Bayes' rule with every trajectory listed."""
+"""Belief over sets against Bayes' rule with every trajectory listed, however it is computed."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 import pytest
+from scipy import sparse
 from toy_tables import random_table, trajectories
 
 from mlci.demonstrations import Demonstration
-from mlci.evidence import Rates
+from mlci.evidence import PAPER, Rates
 from mlci.fixed_horizon import FixedHorizon
 from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.preparation import infer
 from mlci.regions import Regions
-from mlci.sets import infer_sets, set_posterior
+from mlci.set_evidence import SetEvidence
+from mlci.set_inference import infer_sets
+from mlci.set_sampling import sample_sets
+from mlci.sets import SetPosterior, SetPrior, enumerate_sets
+from mlci.spaces import Bools, Box, StateSpace
 from mlci.systems import Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize
 
+STEPS = 5
+LINE = sparse.csr_matrix(np.eye(4, k=1) + np.eye(4, k=-1))  # neighbours are next in number
 
-@pytest.mark.parametrize("seed", [0, 2, 5, 7])
-def test_posterior_is_bayes_rule_with_every_trajectory_listed(seed: int) -> None:
+
+def small_world(seed: int, demonstrations: int = 3, rates: Rates = PAPER) -> tuple:
+    """Evidence of random paths, and of every trajectory its weight and what it crosses."""
     table = random_table(np.random.default_rng(seed), states=6, actions=3, regions=4, cost=1.0)
-    everything, crosses = trajectories(table, steps=5), table.crosses.toarray()
+    everything, crosses = trajectories(table, steps=STEPS), table.crosses.toarray()
     weights = np.array([weight for weight, _, _ in everything])
     crossed = np.array([crosses[rows].any(axis=0) for _, _, rows in everything])
-    paths = np.random.default_rng(1).choice(len(weights), size=3, p=weights / weights.sum())
-    prior = {0: 0.3, 1: 0.5, 2: 0.2}
-    sets = [one for size in prior for one in combinations(range(4), size)]
-    likelihood = {}
+    paths = np.random.default_rng(1).choice(
+        len(weights), size=demonstrations, p=weights / weights.sum()
+    )
+    distribution = FixedHorizon(table, steps=STEPS)
+    beside = partial(distribution.log_avoidance_beside, 0)
+    evidence = SetEvidence([beside] * demonstrations, crossed[paths], rates)
+    return evidence, weights, crossed, paths
+
+
+def bayes(
+    weights: np.ndarray, crossed: Bools, paths: np.ndarray, prior: SetPrior, rates: Rates
+) -> dict[tuple[int, ...], float]:
+    """Probability of each set of at most so many regions, from sums over all trajectories."""
+    eta, eps = rates.model_error, rates.rule_breaking
+    sets = [one for size in range(prior.largest + 1) for one in combinations(range(4), size)]
+    joint, alike = [], {size: sum(len(one) == size for one in sets) for size in range(5)}
     for one in sets:
         avoids = ~crossed[:, list(one)].any(axis=1)
-        chance = weights * avoids / max(np.sum(weights[avoids]), 1e-300)
-        share = prior[len(one)] / sum(len(other) == len(one) for other in sets)
-        likelihood[one] = share * np.prod(chance[paths])
-    total = sum(likelihood.values())
-    joint = FixedHorizon(table, steps=5).joint_avoidance_probabilities(0)
-    result = set_posterior(np.array([joint] * 3), crossed[paths], tuple(prior.values()))
-    assert result.none == pytest.approx(likelihood[()] / total, abs=1e-10)
-    for one in sets[1:]:
-        expected = likelihood[one] / total
-        assert result.probability[one[0], one[-1]] == pytest.approx(expected, abs=1e-10)
-    forbidden = [sum(likelihood[one] for one in sets if i in one) / total for i in range(4)]
+        alpha = np.sum(weights[avoids]) / np.sum(weights)
+        ratio = (1 - eps) * avoids[paths] / max((1 - eta) * alpha + eta, 1e-300) + eps
+        pairs = sum(abs(i - j) == 1 for i, j in combinations(one, 2))
+        share = prior.sizes[len(one)] / alike[len(one)]
+        joint.append(share * np.exp(prior.adjacency * pairs) * np.prod(ratio))
+    return dict(zip(sets, np.array(joint) / np.sum(joint), strict=True))
+
+
+PAIRS = SetPrior((0.3, 0.5, 0.2))
+ALL = SetPrior((0.3, 0.3, 0.2, 0.15, 0.05))
+ISING = SetPrior((0.2, 0.2, 0.2, 0.2, 0.2), adjacency=0.7, neighbours=LINE)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5, 7])
+@pytest.mark.parametrize("prior", [PAIRS, ALL, ISING])
+@pytest.mark.parametrize("rates", [PAPER, Rates(0.1, 0.05)])
+def test_enumeration_is_bayes_rule_with_every_trajectory_listed(
+    seed: int, prior: SetPrior, rates: Rates
+) -> None:
+    evidence, *world = small_world(seed, rates=rates)
+    expected = bayes(*world, prior, rates)
+    result = enumerate_sets(evidence, prior)
+    for one, probability in expected.items():
+        assert result.probability_of(one) == pytest.approx(probability, abs=1e-10)
+    assert result.none == pytest.approx(expected[()], abs=1e-10)
+    forbidden = [sum(p for one, p in expected.items() if i in one) for i in range(4)]
     np.testing.assert_allclose(result.marginal, forbidden, atol=1e-10)
-    assert np.sum(np.tril(result.probability, -1)) == 0
-    assert result.most_probable() == max(sets, key=lambda one: likelihood[one])
+    sizes = [sum(p for one, p in expected.items() if len(one) == k) for k in range(5)]
+    np.testing.assert_allclose(result.sizes, sizes, atol=1e-10)
+    assert expected[result.most_probable()] == pytest.approx(max(expected.values()), abs=1e-10)
+
+
+@pytest.mark.parametrize("prior", [ALL, ISING])
+def test_a_sample_agrees_with_enumeration(prior: SetPrior) -> None:
+    evidence, *_ = small_world(2, demonstrations=2, rates=Rates(0.1, 0.3))
+    exact = enumerate_sets(evidence, prior)
+    sample = sample_sets(evidence, prior, np.random.default_rng(3), steps=1000)
+    assert sample.check is not None
+    assert sample.check.agrees
+    # Four standard errors: a right sampler fails one in 4000 of the five times two.
+    error = sample.check.standard_error
+    assert np.all(np.abs(sample.marginal - exact.marginal) < 4 * error[:-1])
+    mean = sample.sizes @ np.arange(5), exact.sizes @ np.arange(5)
+    assert abs(mean[0] - mean[1]) < 4 * error[-1]
+    assert error[:-1].max() < 0.05
+    assert sample.most_probable() == exact.most_probable()
+    # Gains and weights of a sample are exact.
+    known = {tuple(row): k for k, row in enumerate(exact.members)}
+    place = [known[tuple(row)] for row in sample.members]
+    np.testing.assert_allclose(sample.gain, exact.gain[place], atol=1e-10)
+    np.testing.assert_allclose(sample.weight, exact.weight[place], atol=1e-10)
+
+
+def test_a_sample_is_told_by_its_seed_and_never_breaks_a_rule() -> None:
+    evidence, *_ = small_world(2, demonstrations=2)
+    first, second, other = (
+        sample_sets(evidence, ALL, np.random.default_rng(seed), steps=50) for seed in (1, 1, 2)
+    )
+    np.testing.assert_array_equal(first.members, second.members)
+    np.testing.assert_array_equal(first.probability, second.probability)
+    assert first.probability.shape != other.probability.shape or np.any(
+        first.probability != other.probability
+    )
+    assert not np.any(first.members & evidence.violated.any(axis=0))
 
 
 def small_model() -> TabularModel:
@@ -59,32 +130,32 @@ def small_model() -> TabularModel:
 
 @pytest.mark.parametrize("exact_ends", [False, True])
 def test_joint_avoidance_is_the_ratio_of_partitions(exact_ends: bool) -> None:
-    """alpha_ij = Z under both / Z, also where the first and last moves are of states."""
+    """alpha of a set = Z under the set / Z, also where the first and last moves are of states."""
     model = small_model()
     demonstration = Demonstration.from_path([[0.5, 0.0], [3.0, 0.1]], 3.0)
     free = TrajectoryDistribution.of_task(model, demonstration.task, exact_ends=exact_ends)
-    joint, alone = free.joint_avoidance_probabilities(), free.avoidance_probabilities()
-    np.testing.assert_array_equal(np.diag(joint), alone)
-    np.testing.assert_array_equal(joint, joint.T)
+    alone = free.avoidance_probabilities()
+    some = [0, *np.flatnonzero(alone < 0.999)]
+    nothing = np.zeros(len(alone), dtype=bool)
+    np.testing.assert_allclose(np.exp(free.log_avoidance_beside(nothing)), alone, rtol=1e-12)
     start, most = free.start, 0.0
-    for i, j in combinations([0, *np.flatnonzero(alone < 0.999)], 2):
-        mask = np.isin(np.arange(len(model.regions)), [i, j])
-        under = replace(free, model=model.under(mask))
-        expected = np.exp(under.log_z[0, start] - free.log_z[0, start])
-        assert joint[i, j] == pytest.approx(expected, rel=1e-10, abs=1e-300)
-        most = max(most, abs(joint[i, j] - alone[i] * alone[j]))
+    for others in ([], *([i] for i in some), some[1:3]):
+        mask = np.isin(np.arange(len(model.regions)), others)
+        beside = free.log_avoidance_beside(mask)
+        for j in some:
+            both = mask | (np.arange(len(mask)) == j)
+            under = replace(free, model=model.under(both))
+            expected = under.log_z[0, start] - free.log_z[0, start]
+            assert beside[j] == pytest.approx(expected, abs=1e-10)
+            if len(others) == 1 and j != others[0]:
+                most = max(most, abs(np.exp(beside[j]) - alone[j] * alone[others[0]]))
     assert most > 0.1  # far from independent
 
 
-def test_evidence_of_a_pair_has_the_rates_of_one() -> None:
-    joint = np.array([[[0.5, 0.2], [0.2, 0.4]], [[0.9, 0.6], [0.6, 0.7]]])
-    violated = np.array([[False, False], [True, False]])
-    result = set_posterior(joint, violated, rates=Rates(model_error=0.1, rule_breaking=0.05))
-    of_pair = np.log(0.95 / (0.9 * 0.2 + 0.1) + 0.05) + np.log(0.05)
-    assert result.gain[0, 1] == pytest.approx(of_pair)
-    assert result.gain[1, 1] == pytest.approx(
-        np.log(0.95 / (0.9 * 0.4 + 0.1) + 0.05) + np.log(0.95 / (0.9 * 0.7 + 0.1) + 0.05)
-    )
+def test_what_the_others_make_impossible_is_certain_to_be_entered() -> None:
+    evidence, *_ = small_world(5)
+    everything = np.ones(4, dtype=bool)
+    assert np.all(evidence.avoidance[0](everything) <= 0)  # type: ignore[misc]
 
 
 def inferred(model: TabularModel) -> tuple[list[Demonstration], Inference]:
@@ -100,9 +171,21 @@ def test_without_pairs_it_is_the_inference() -> None:
     silent = np.zeros(inference.violated.shape, dtype=bool)
     silent[0, 1] = True
     for each in (inference, replace(inference, decided_by_cell=silent)):
-        result = infer_sets(model, demonstrations, each, prior=(0.5, 0.5, 0.0))
-        np.testing.assert_allclose(np.diag(result.probability), each.posterior, atol=1e-12)
+        result = infer_sets(model, demonstrations, each, SetPrior((0.5, 0.5)))
+        np.testing.assert_allclose(result.marginal, each.posterior, atol=1e-12)
         assert result.none == pytest.approx(each.posterior_none, abs=1e-12)
+
+
+def test_hypotheses_may_be_some_of_the_models_regions() -> None:
+    model = small_model()
+    demonstrations, _ = inferred(model)
+    some = np.arange(30) % 3 == 0
+    inference = infer(model, demonstrations, hypotheses=some)
+    prior = SetPrior((0.4, 0.3, 0.3))
+    result = infer_sets(model, demonstrations, inference, prior, hypotheses=some)
+    fewer = replace(model, regions=model.regions.select(some), kept=None, truth=np.zeros(0, bool))
+    alone = infer_sets(fewer, demonstrations, infer(fewer, demonstrations), prior)
+    np.testing.assert_allclose(result.marginal, alone.marginal, atol=1e-12)
 
 
 def test_a_silent_region_adds_nothing_to_another() -> None:
@@ -111,29 +194,106 @@ def test_a_silent_region_adds_nothing_to_another() -> None:
     silent = np.zeros(inference.violated.shape, dtype=bool)
     silent[:, 1] = True
     inference = replace(inference, violated=silent & False, decided_by_cell=silent)
-    gain = infer_sets(model, demonstrations, inference).gain
-    assert gain[1, 1] == 0
-    assert gain[0, 1] == pytest.approx(gain[0, 0], abs=1e-12)
-    assert gain[1, 2] == pytest.approx(gain[2, 2], abs=1e-12)
+    evidence = SetEvidence.of(model, demonstrations, inference)
+    mask = np.arange(30) == 0
+    assert evidence.gain(np.arange(30) == 1) == 0
+    assert evidence.beside(mask)[1] == pytest.approx(evidence.gain(mask), abs=1e-12)
+    with_silent = mask | (np.arange(30) == 1)
+    np.testing.assert_allclose(evidence.beside(with_silent), evidence.beside(mask), atol=1e-12)
 
 
-def test_a_row_a_set() -> None:
-    joint = np.array([[[0.5, 0.1], [0.1, 0.4]]])
-    result = set_posterior(joint, np.zeros((1, 2), dtype=bool), prior=(0.2, 0.4, 0.4))
-    frame = result.to_frame(["a", "b"])
-    assert frame["first"].fillna("-").tolist() == ["a", "b", "a", "-"]
-    assert frame["second"].fillna("-").tolist() == ["b", "-", "-", "-"]
-    weight = np.array([0.4 / 0.1, 0.2 / 0.4, 0.2 / 0.5, 0.2])
-    np.testing.assert_allclose(frame["probability"], weight / weight.sum())
-    assert result.most_probable() == (0, 1)
+def test_the_first_demonstrations_alone() -> None:
+    model = small_model()
+    demonstrations, inference = inferred(model)
+    first = SetEvidence.of(model, demonstrations, inference).of_first(1)
+    again = SetEvidence.of(model, demonstrations[:1], inference.of(slice(1)))
+    mask = np.isin(np.arange(30), [13, 14])
+    np.testing.assert_array_equal(first.beside(mask), again.beside(mask))
+
+
+def test_a_task_that_cannot_be_done_says_nothing_by_what_it_avoids() -> None:
+    violated = np.array([[True, False, False]])
+    evidence = SetEvidence([None], violated, Rates(0.0, 0.1))
+    nothing = np.zeros(3, dtype=bool)
+    np.testing.assert_allclose(evidence.beside(nothing), [np.log(0.1), 0, 0], atol=1e-15)
+
+
+def test_an_unavoidable_set_takes_all_the_probability_or_refuses_to_be_sampled() -> None:
+    def beside(others: Bools) -> np.ndarray:
+        return np.where(others.any() | np.array([False, True]), -np.inf, np.log(0.5))
+
+    evidence = SetEvidence([beside], np.zeros((1, 2), dtype=bool))
+    result = enumerate_sets(evidence, SetPrior((0.5, 0.3, 0.2)))
+    assert result.none == 0
+    assert result.probability_of([1]) == pytest.approx(0.15 / 0.35)
+    assert result.probability_of([0, 1]) == pytest.approx(0.2 / 0.35)
+    with pytest.raises(ValueError, match="sample with a model error above 0"):
+        sample_sets(evidence, SetPrior((0.5, 0.3, 0.2)), np.random.default_rng(0))
+
+
+def hand_made(prior: SetPrior) -> SetPosterior:
+    """Evidence in which regions 0 and 1 explain alike, and 2 nothing."""
+
+    def beside(others: Bools) -> np.ndarray:
+        sets = others | np.eye(3, dtype=bool)
+        return np.log(np.where(sets[:, 0] | sets[:, 1], 0.25, 1.0))
+
+    return enumerate_sets(SetEvidence([beside], np.zeros((1, 3), dtype=bool)), prior)
+
+
+def test_what_a_posterior_says() -> None:
+    result = hand_made(SetPrior((0.2, 0.4, 0.2, 0.2)))
+    frame = result.to_frame(["a", "b", "c"])
+    weight = {"": 0.2, "a": 1.6 / 3, "b": 1.6 / 3, "c": 0.4 / 3, "a, b, c": 0.8}
+    weight |= {"a, b": 0.8 / 3, "a, c": 0.8 / 3, "b, c": 0.8 / 3}
+    total = sum(weight.values())
+    assert frame["set"].iloc[0] == "a, b, c"
+    for row in frame.itertuples():
+        assert row.probability == pytest.approx(weight[row.set] / total)
+        assert row.gain == pytest.approx(np.log(4) if {"a", "b"} & set(row.set) else 0, abs=1e-12)
+        assert row.size == len(row.set.replace(", ", ""))
+    assert result.most_probable() == (0, 1, 2)
+    # By marginals a and b come first: none, a, b, and both are inside of {a, b}.
+    inside = (weight[""] + weight["a"] + weight["b"] + weight["a, b"]) / total
+    np.testing.assert_array_equal(result.credible_regions(inside), [0, 1])
+    np.testing.assert_array_equal(result.credible_regions(inside + 1e-6), [0, 1, 2])
+    np.testing.assert_array_equal(result.credible_regions(weight[""] / total), [])
+
+
+def test_areas_join_neighbours_with_much_of_the_largest_marginal() -> None:
+    result = hand_made(SetPrior((0.2, 0.8)))
+    space = StateSpace(Box([0.0], [6.0]), [False], ("x",), ("m",))
+    apart = Regions.from_boxes(space, [Box([0.0], [1.0]), Box([4.0], [5.0]), Box([1.0], [2.0])])
+    first, second = result.areas(apart)
+    assert [first.regions.tolist(), second.regions.tolist()] == [[0], [1]]
+    assert first.probability == pytest.approx(result.marginal[0])
+    whole, other = result.areas(apart, share=0.1)
+    assert [whole.regions.tolist(), other.regions.tolist()] == [[0, 2], [1]]
+    assert whole.probability == pytest.approx(1 - result.none - result.marginal[1])
+
+
+def test_a_geometric_prior_and_neighbours() -> None:
+    prior = SetPrior.geometric(0.4, 0.5, 3, adjacency=2.0, neighbours=LINE + sparse.eye(4))
+    np.testing.assert_allclose(prior.sizes, [0.4, 0.6 * 4 / 7, 0.6 * 2 / 7, 0.6 / 7])
+    three = np.array([True, True, True, False])
+    assert prior.log(three) == pytest.approx(np.log(0.6 / 7 / 4) + 4.0)
+    assert prior.log_beside(np.array([True, False, True, False]))[1] == prior.log(three)
+    assert prior.log_beside(three).tolist() == [prior.log(three)] * 3 + [-np.inf]
 
 
 def test_what_does_not_fit_is_refused() -> None:
     violated = np.zeros((1, 2), dtype=bool)
-    with pytest.raises(ValueError, match=r"joint_avoidance \(1, 2, 3\) and violated \(1, 2\)"):
-        set_posterior(np.ones((1, 2, 3)), violated)
-    with pytest.raises(ValueError, match=r"adds up to 1, not \(0.5, 0.5, 0.5\)"):
-        set_posterior(np.ones((1, 2, 2)), violated, prior=(0.5, 0.5, 0.5))
+    with pytest.raises(ValueError, match=r"2 tasks do not fit violated \(1, 2\)"):
+        SetEvidence([None, None], violated)
+    with pytest.raises(ValueError, match=r"add up to 1, not \(0.5, 0.5, 0.5\)"):
+        SetPrior((0.5, 0.5, 0.5))
+    with pytest.raises(ValueError, match="needs to be told who are neighbours"):
+        SetPrior(adjacency=1.0)
+    with pytest.raises(ValueError, match="a chain and four steps, not 4 and 3"):
+        sample_sets(SetEvidence([None], violated), PAIRS, np.random.default_rng(0), steps=3)
+    many = SetEvidence([None], np.zeros((1, 14), dtype=bool))
+    with pytest.raises(ValueError, match="sets of up to 14 of 14 regions are too many"):
+        enumerate_sets(many, SetPrior.geometric(0.5, 0.5, 14))
     model = small_model()
     demonstrations, inference = inferred(model)
     with pytest.raises(ValueError, match="1 demonstrations and 30 regions do not fit"):
