@@ -55,6 +55,8 @@ from mlci.set_sampling import sample_sets
 from mlci.set_search import Selection
 from mlci.sets import SetPosterior, SetPrior, enumerate_sets
 from mlci.simulate import rollout
+from mlci.soft import soften
+from mlci.soft_weight import WeightEstimate, estimate_weights
 from mlci.spaces import Box, StateSpace
 from mlci.system_check import check_affine, check_system
 from mlci.systems import (
@@ -107,6 +109,7 @@ __all__ = [
     "Task",
     "TelescopingPendulum",
     "TrajectoryDistribution",
+    "WeightEstimate",
     "action_grid",
     "calibrate",
     "check_affine",
@@ -115,6 +118,7 @@ __all__ = [
     "diagnose",
     "discretize",
     "enumerate_sets",
+    "estimate_weights",
     "infer",
     "infer_sets",
     "prepare",
@@ -124,6 +128,7 @@ __all__ = [
     "sample_trials",
     "select_constraints",
     "select_regions",
+    "soften",
     "solve_safe_set",
     "write_demonstration",
 ]

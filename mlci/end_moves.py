@@ -8,6 +8,8 @@ cell would seem unavoidable, although the demonstration begins and ends outside 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 import scipy  # loads scipy.sparse when it is first used
 
@@ -16,44 +18,51 @@ from mlci.simulate import rollout
 from mlci.spaces import Box, Floats, Ints
 from mlci.tabular import TabularModel, follow
 
+# Of L moves: the cell (L,) that each begins in, its reward (L,) [nat] and its path (L, K+1, n).
+MovePaths = tuple[Ints, Floats, Floats]
+
 
 def first_moves(model: TabularModel, start: Floats) -> MergedMoves:
     """Every action from a state (n,), as far as it stays in the space and out of the truth."""
-    cell, path, reward = _from_state(model, start)
-    return _allowed(model, cell, reward, *follow(model.grid, model.regions, path))
+    return allowed_moves(model, [first_paths(model, start)])
 
 
 def last_moves(model: TabularModel, cells: Ints, goal_cells: Ints, goal: Box) -> MergedMoves:
     """The moves from some cells, in order, into the goal's cells, bent to end in the goal."""
-    parts = []
+    return allowed_moves(model, last_paths(model, cells, goal_cells, goal))
+
+
+def only_moves(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> MergedMoves:
+    """The moves of a trajectory of one step: from a state into the goal region."""
+    return allowed_moves(model, [only_paths(model, start, goal_cells, goal)])
+
+
+def first_paths(model: TabularModel, start: Floats) -> MovePaths:
+    """The paths of all actions from a state (n,)."""
+    origin = np.broadcast_to(start, (len(model.actions), len(start)))
+    path = rollout(model.system, origin, model.actions[:, None, :], model.dt, model.substeps)
+    cell = np.full(len(origin), model.grid.index(start))
+    return cell, model.move_reward(origin, model.actions), path
+
+
+def last_paths(
+    model: TabularModel, cells: Ints, goal_cells: Ints, goal: Box
+) -> Iterator[MovePaths]:
+    """The paths of `last_moves`, block by block."""
     for block in model.blocks(np.intersect1d(cells, model.merged.cells_into(goal_cells))):
         # Whether the truth allows a move is seen on the bent path.
         moves = model.moves_of(block)
         row, move = np.nonzero(np.isin(moves.successor, goal_cells))
         origin, action = model.move_origins(block[row], move), model.actions[model.action[move]]
         path = rollout(model.system, origin, action[:, None, :], model.dt, model.substeps)
-        bent = follow(model.grid, model.regions, _bent(model, path, goal))
-        parts.append((block[row], moves.reward[row, move], *bent))
-    cell, reward, successor = (np.concatenate([part[i] for part in parts]) for i in range(3))
-    return _allowed(
-        model, cell, reward, successor, scipy.sparse.vstack([part[3] for part in parts])
-    )
+        yield block[row], moves.reward[row, move], _bent(model, path, goal)
 
 
-def only_moves(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> MergedMoves:
-    """The moves of a trajectory of one step: from a state into the goal region."""
-    cell, path, reward = _from_state(model, start)
+def only_paths(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> MovePaths:
+    """The paths of `only_moves`."""
+    cell, reward, path = first_paths(model, start)
     into = np.isin(model.grid.index(path[:, -1]), goal_cells)
-    bent = follow(model.grid, model.regions, _bent(model, path[into], goal))
-    return _allowed(model, cell[into], reward[into], *bent)
-
-
-def _from_state(model: TabularModel, start: Floats) -> tuple[Ints, Floats, Floats]:
-    """The cell (A,), path (A, K+1, n) and reward (A,) of all actions from a state (n,)."""
-    origin = np.broadcast_to(start, (len(model.actions), len(start)))
-    path = rollout(model.system, origin, model.actions[:, None, :], model.dt, model.substeps)
-    cell = np.full(len(origin), model.grid.index(start))
-    return cell, path, model.move_reward(origin, model.actions)
+    return cell[into], reward[into], _bent(model, path[into], goal)
 
 
 def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
@@ -63,17 +72,17 @@ def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
     return path - share * beyond[:, None, :]
 
 
-def _allowed(
-    model: TabularModel,
-    cell: Ints,
-    reward: Floats,
-    successor: Ints,
-    crosses: scipy.sparse.csr_matrix,
-) -> MergedMoves:
-    """L moves, in order of cell; those that leave the space or cross the truth are forbidden.
+def allowed_moves(model: TabularModel, parts: Iterable[MovePaths]) -> MergedMoves:
+    """L moves by their paths, in order of cell; those that leave the space or cross the truth are
+    forbidden.
 
     None is merged with another.
     """
+    followed = [
+        (cell, reward, *follow(model.grid, model.regions, path)) for cell, reward, path in parts
+    ]
+    cell, reward, successor = (np.concatenate([part[i] for part in followed]) for i in range(3))
+    crosses = scipy.sparse.vstack([part[3] for part in followed], format="csr")
     forbidden = (successor < 0) | (crosses @ model.truth)
     return MergedMoves(
         begins=np.searchsorted(cell, np.arange(model.states + 1)),

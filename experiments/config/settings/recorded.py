@@ -9,6 +9,7 @@ from pydantic.dataclasses import dataclass
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
+    CountOrNone,
     DepthShare,
     Flag,
     NotNegative,
@@ -126,6 +127,13 @@ class RecordedSettings(ModelSettings):
         about(
             "also tell the temperature that the demonstrations look like; takes about ten times as "
             "long as the inference"
+        ),
+    ]
+    soft: Annotated[
+        CountOrNone,
+        about(
+            "soft or hard? For so many regions, the first of the ranking before all others, the "
+            "weight of each second inside, with its interval; 0 for none"
         ),
     ]
     top: Annotated[Count, about("hypotheses that are printed")]
