@@ -76,6 +76,8 @@ def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) 
     yield from entry("assumed", "; ".join(answer.assumptions))
     yield from entry("rests on", _carrier_words(answer))
     yield from entry("", _left_out_words(answer))
+    for estimate in answer.weights:
+        yield from entry("soft or hard?", f"region {estimate.region} {estimate}")
     for warning in answer.warnings:
         yield from entry("warning", warning)
 

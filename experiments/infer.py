@@ -27,7 +27,12 @@ from experiments.lookback.recordings import CALIBRATION
 from experiments.page.document import page
 from experiments.point.forecasts import exported_calibration, recorded_calibration
 from experiments.point.ranking_tables import ranking_table
-from experiments.point.recorded import plausibilities, read_recordings, together
+from experiments.point.recorded import (
+    plausibilities,
+    read_recordings,
+    recorded_weights,
+    together,
+)
 from experiments.point.recorded_tables import demonstration_tables, path_table
 from experiments.progress import begin, steps_shown
 from experiments.terminal import complain, counted, entry, say
@@ -171,6 +176,7 @@ def _answer(
         exact_ends=exact_ends,
         temperature=temperature,
         doubts=doubts,
+        weights=recorded_weights(settings, model, demonstrations, inference),
     )
 
 

@@ -14,6 +14,7 @@ from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.misfit import SAMPLES, Misfit, misfit
 from mlci.regions import Regions
+from mlci.soft_weight import WeightEstimate
 from mlci.spaces import Bools, Ints
 from mlci.support import Support, support
 from mlci.tabular import TabularModel
@@ -39,6 +40,7 @@ class Answer:
         exact_ends: whether its trajectories begin and end at states, not at cells.
         temperature_estimate: the temperature that the demonstrations look like, if it is known.
         doubts: about the recordings themselves, such as `mlci.recordings.plausibility.summary`.
+        weights: soft or hard? What `mlci.soft_weight.estimate_weights` made of some regions.
     """
 
     inference: Inference
@@ -50,6 +52,7 @@ class Answer:
     exact_ends: bool
     temperature_estimate: TemperatureEstimate | None = None
     doubts: tuple[str, ...] = ()
+    weights: tuple[WeightEstimate, ...] = ()
 
     @property
     def assumptions(self) -> list[str]:
@@ -116,6 +119,7 @@ class Answer:
             "temperature_estimate": None
             if self.temperature_estimate is None
             else self.temperature_estimate.record(),
+            "weights": [estimate.record() for estimate in self.weights],
             "unseen": [names[i] for i in self.unseen],
             "warnings": self.warnings,
         }
@@ -162,6 +166,7 @@ def answer(
     samples: int = SAMPLES,
     temperature: TemperatureEstimate | None = None,
     doubts: Sequence[str] = (),
+    weights: Sequence[WeightEstimate] = (),
 ) -> Answer:
     """Look at an inference from all sides.
 
@@ -175,6 +180,7 @@ def answer(
         samples: as of `misfit`.
         temperature: what `mlci.temperature.estimate_temperature` made of the demonstrations.
         doubts: about the recordings themselves.
+        weights: what `mlci.soft_weight.estimate_weights` made of the demonstrations.
     """
     distributions = (
         TrajectoryDistribution.of_task(
@@ -198,6 +204,7 @@ def answer(
         exact_ends=exact_ends,
         temperature_estimate=temperature,
         doubts=tuple(doubts),
+        weights=tuple(weights),
     )
 
 

@@ -87,7 +87,7 @@ MLCI = {
     "mlci.credible_sets": "mlci.evidence mlci.regions",
     "mlci.support": "mlci.inference",
     "mlci.misfit": "mlci.maxent",
-    "mlci.answers": "mlci.misfit mlci.support mlci.temperature",
+    "mlci.answers": "mlci.misfit mlci.soft_weight mlci.support mlci.temperature",
     "mlci.metrics": "mlci.evidence",
 }
 # What mlci may import of others: no configs, no formats but those of recordings, no figures.

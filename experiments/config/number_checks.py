@@ -11,7 +11,14 @@ import re
 from collections.abc import Iterator
 
 from experiments.config.memory import expected_memory, machine_memory
-from experiments.config.settings import AdviceSettings, ModelSettings, Settings, StudySettings
+from experiments.config.settings import (
+    AdviceSettings,
+    ModelSettings,
+    RecordedSettings,
+    Settings,
+    StudySettings,
+)
+from mlci.tabular import MOST_KEPT
 
 _MOST_STEPS = 100_000
 _LONGEST_NAME = 200  # letters of a study; files of 255 bytes are named after it
@@ -70,6 +77,17 @@ def size_problems(settings: ModelSettings) -> Iterator[str]:
             f"grid.shape: {list(settings.grid.shape)} with {list(settings.action_counts)} actions, "
             f"{settings.transition.samples} samples and these hypotheses takes about {needed:.3g} "
             f"GB, and this machine has {there:.3g}; use fewer cells, actions, samples or hypotheses"
+        )
+
+
+def soft_problems(settings: RecordedSettings) -> Iterator[str]:
+    """Weights need every single move, which a large model does not keep."""
+    moves = settings.transition.samples ** len(settings.grid.shape)
+    moves *= math.prod(settings.grid.shape) * math.prod(settings.action_counts)
+    if settings.soft and moves > MOST_KEPT:
+        yield (
+            f"soft: {settings.soft}, but a weight needs every single move, and {moves} are more "
+            f"than the {MOST_KEPT} that are kept; use fewer cells, actions or samples, or soft=0"
         )
 
 

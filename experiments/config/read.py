@@ -22,6 +22,7 @@ from experiments.config.number_checks import (
     budget_problems,
     count_problems,
     size_problems,
+    soft_problems,
     study_problems,
 )
 from experiments.config.paths import HasResults, results_folder
@@ -106,7 +107,7 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
         RecordedSettings, {**used, "tasks": None if isinstance(table, Mapping) else table}
     )
     _refuse(shape_problems(settings), recorded_shape_problems(settings))
-    _refuse(size_problems(settings))
+    _refuse(size_problems(settings), soft_problems(settings))
     return settings
 
 

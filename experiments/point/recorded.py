@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 from experiments.config.problems import ConfigError
 from experiments.config.settings import RecordedSettings
+from experiments.progress import begin
 from mlci.demonstrations import Demonstration
+from mlci.inference import Inference
 from mlci.maxent import ROUNDED_TIMES
 from mlci.recordings.paths import Repair
 from mlci.recordings.plausibility import Plausibility, plausibility
@@ -14,6 +16,8 @@ from mlci.recordings.read import Readings, read_demonstrations
 from mlci.recordings.recording import Remark
 from mlci.recordings.task_table import read_task_table
 from mlci.recordings.times import refuse_long
+from mlci.soft_weight import WeightEstimate, best_forgiven, estimate_weights
+from mlci.tabular import TabularModel
 
 _OVERSTATED = (
     "shallow or short crossings of the recordings do not count, but those of the tabular model do: "
@@ -74,6 +78,26 @@ def plausibilities(
     return [
         plausibility(settings.model, settings.candidates, each, crossing) for each in demonstrations
     ]
+
+
+def recorded_weights(
+    settings: RecordedSettings,
+    model: TabularModel,
+    demonstrations: Sequence[Demonstration],
+    inference: Inference,
+) -> list[WeightEstimate]:
+    """Soft or hard? The weights of so many regions as the settings ask for."""
+    if not settings.soft:
+        return []
+    begin("soft or hard?")
+    return estimate_weights(
+        model,
+        demonstrations,
+        inference,
+        regions=best_forgiven(inference, settings.soft),
+        round_horizon=True,
+        exact_ends=settings.inference.exact_ends,
+    )
 
 
 def together(remarks: Sequence[Remark]) -> list[str]:

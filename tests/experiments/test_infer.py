@@ -127,6 +127,19 @@ def test_the_temperature_is_told_on_demand(recorded: Path) -> None:
     assert estimate["lower"] <= estimate["temperature"] <= estimate["upper"]
 
 
+def test_soft_or_hard_is_told_on_demand(recorded: Path) -> None:
+    coarse = ("demonstrations=recorded", "grid=100", "dt=0.5", "inference.calibrate=false")
+    done = infer(recorded, *coarse, "soft=2")
+    assert done.returncode == 0, done.stderr
+    answer = json.loads((saved(recorded) / "answer.json").read_text())
+    first, second = answer["weights"]
+    assert first["region"] == answer["first"]["region"] != second["region"]
+    assert f"soft or hard? region {first['region']} " in " ".join(done.stdout.split())
+    refused = infer(recorded, *coarse, "soft=2", "transition.samples=200")
+    assert refused.returncode == 2
+    assert "soft: 2, but a weight needs every single move, and 36000000 are more" in refused.stderr
+
+
 def test_durations_that_dt_does_not_divide(recorded: Path) -> None:
     done = infer(recorded, "demonstrations=recorded", "grid=100", "dt=0.3")
     assert done.returncode == 0, done.stderr

@@ -15,6 +15,7 @@ from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.preparation import infer
 from mlci.regions import Regions
+from mlci.soft_weight import WeightEstimate
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator
 from mlci.tabular import action_grid, discretize
@@ -55,6 +56,14 @@ def test_the_temperature_that_paths_look_like_is_told(result: Answer) -> None:
     assert estimate.warnings[0] in more.warnings
     assert json.loads(json.dumps(more.record()))["temperature_estimate"]["lower"] == 0.2
     assert result.record()["temperature_estimate"] is None
+
+
+def test_whether_regions_are_soft_is_told(result: Answer) -> None:
+    estimate = WeightEstimate("1", np.inf, 2.0, np.inf, 3.0, 0.0, 0.0, 0.7, 4)
+    (record,) = json.loads(json.dumps(replace(result, weights=(estimate,)).record()))["weights"]
+    assert (record["region"], record["lower"], record["upper"]) == ("1", 2.0, None)
+    assert record["verdict"] == "as a wall"
+    assert result.record()["weights"] == []
 
 
 def test_the_parts_are_of_the_inference(result: Answer) -> None:
