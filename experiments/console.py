@@ -183,6 +183,19 @@ def _side(box: Box, d: int) -> str:
     return f"{box.lower[d]:.4g} to {box.upper[d]:.4g}"
 
 
+def refutation_lines(inference: Inference) -> list[str]:
+    """Which hypotheses each demonstration refutes, by their numbers; * where it alone does."""
+    alone = np.sum(inference.violated, axis=0) == 1
+    lines = entry("", "hypotheses that each refutes (* no other does):")
+    for name, violated, reachable in zip(
+        inference.names, inference.violated, inference.reachable, strict=True
+    ):
+        numbers = [f"{i}{'*' if alone[i] else ''}" for i in np.flatnonzero(violated)]
+        note = [] if reachable else ["(goal unreachable: adds no gain)"]
+        lines += entry("", " ".join([name, *numbers, *note]), hang=2)
+    return lines
+
+
 def measure_lines(summary: pd.Series, ranks: pd.DataFrame, top: int) -> Iterator[str]:
     """The study's three measures."""
     yield from entry(

@@ -22,7 +22,7 @@ from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
 from experiments.config.read import read_recorded_config, writable_results
 from experiments.config.settings import ESTIMATE, RecordedSettings
-from experiments.console import answer_lines, diagnosis_lines
+from experiments.console import answer_lines, diagnosis_lines, refutation_lines
 from experiments.lookback.recordings import CALIBRATION
 from experiments.page.document import page
 from experiments.point.forecasts import exported_calibration, recorded_calibration
@@ -116,7 +116,7 @@ def infer(settings: RecordedSettings) -> int:
     for line in (
         *_answer_lines(settings, result, calibration),
         f"demonstrations  {count} used, {counted(len(problems), 'file')} not used",
-        *_refutation_lines(result.inference),
+        *refutation_lines(result.inference),
         *diagnosis_lines(diagnosis, space.names, unreachable, count),
         f"written: {shown_path(folder)}",
         f"page: {shown_path(folder / 'page.html')}",
@@ -211,19 +211,6 @@ def _doubt_lines(checks: Sequence[Plausibility]) -> list[str]:
     lines = [line for check in doubtful for line in entry("doubtful", str(check), hang=2)]
     good = len(checks) - len(doubtful)
     return lines + entry("recordings", f"{good} of {len(checks)} are plausible")
-
-
-def _refutation_lines(inference: Inference) -> list[str]:
-    """Which hypotheses each demonstration refutes, by their numbers; * where it alone does."""
-    alone = np.sum(inference.violated, axis=0) == 1
-    lines = entry("", "hypotheses that each refutes (* no other does):")
-    for name, violated, reachable in zip(
-        inference.names, inference.violated, inference.reachable, strict=True
-    ):
-        numbers = [f"{i}{'*' if alone[i] else ''}" for i in np.flatnonzero(violated)]
-        note = [] if reachable else ["(goal unreachable: adds no gain)"]
-        lines += entry("", " ".join([name, *numbers, *note]), hang=2)
-    return lines
 
 
 def _save(

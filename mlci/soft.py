@@ -137,9 +137,9 @@ class SoftModel:
 
     def _timed(self, parts: Sequence[MovePaths]) -> TimedMoves:
         """Moves from or to states, none merged with another."""
-        alone = self.model.regions.select(np.arange(len(self.model.regions)) == self.region)
-        times = [path_times(alone, path, self.model.dt) for *_, path in parts]
-        return TimedMoves(allowed_moves(self.model, parts), np.concatenate(times))
+        model = self.model
+        times = [path_times(model.regions, self.region, path, model.dt) for *_, path in parts]
+        return TimedMoves(allowed_moves(model, parts), np.concatenate(times))
 
 
 @dataclass(frozen=True, eq=False)

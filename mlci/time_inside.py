@@ -1,7 +1,7 @@
 """How long moves and recorded paths are inside a region.
 
 A path of chords is inside from where a chord enters the region to where it leaves it
-(`mlci.regions.Regions.chord_hits`). A chord takes its share of the move's time: exact on the
+(`mlci.shapes.Shape.spans`). A chord takes its share of the move's time: exact on the
 polyline, which strays from the curve by a hundredth of a cell at most (`mlci.tabular`).
 """
 
@@ -30,21 +30,21 @@ def time_inside(regions: Regions, path: ArrayLike, times: ArrayLike) -> Floats:
     return np.asarray(inside, dtype=float)
 
 
-def path_times(region: Regions, paths: Floats, dt: float) -> Floats:
-    """(L,) time that paths (L, K+1, n) of dt [s] each spend inside one region [s].
+def path_times(regions: Regions, region: int, paths: Floats, dt: float) -> Floats:
+    """(L,) time that paths (L, K+1, n) of dt [s] each spend inside a region [s].
 
     Args:
-        region: a set of one region.
+        regions: the C regions.
+        region: number of one of them.
         paths: whose chords take equal times, not wrapped.
         dt: duration of each path.
     """
     count, chords, n = len(paths), paths.shape[1] - 1, paths.shape[2]
-    starts = region.space.wrap(paths[:, :-1]).reshape(-1, n)
+    starts = regions.space.wrap(paths[:, :-1]).reshape(-1, n)
     steps = np.diff(paths, axis=1).reshape(-1, n)
-    chord, _, enter, leave = region.chord_hits(starts, steps)
-    share = np.minimum(leave, 1.0) - np.maximum(enter, 0.0)
-    times = np.bincount(chord // chords, share * (dt / chords), minlength=count)
-    return np.asarray(times, dtype=float)
+    parts = regions.shape(region).spans(regions.space, starts, steps)
+    share = (parts.leave - parts.enter) / chords
+    return np.asarray(dt * np.bincount(parts.chord // chords, share, minlength=count), dtype=float)
 
 
 def move_times(model: TabularModel, region: int) -> Floats:
@@ -54,12 +54,12 @@ def move_times(model: TabularModel, region: int) -> Floats:
         model: the tabular model, whose moves follow its dynamics.
         region: number of one of its regions.
     """
-    alone = model.regions.select(np.arange(len(model.regions)) == region)
     parts = []
     for cells in model.blocks():
         cell, move = np.repeat(cells, model.moves), np.tile(np.arange(model.moves), len(cells))
         action = model.actions[model.action[move]]
         origin = model.move_origins(cell, move)
         paths = rollout(model.system, origin, action[:, None, :], model.dt, model.substeps)
-        parts.append(path_times(alone, paths, model.dt).reshape(len(cells), model.moves))
+        times = path_times(model.regions, region, paths, model.dt)
+        parts.append(times.reshape(len(cells), model.moves))
     return np.concatenate(parts)
