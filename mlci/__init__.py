@@ -45,9 +45,11 @@ from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.predicates import InTaskSpace, Predicate
 from mlci.preparation import PreparedInference, infer, prepare
+from mlci.rank_errors import RankErrors, infer_until_settled, rank_errors
 from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
 from mlci.safety_filter import SafetyFilter
+from mlci.sampled import SampledDistribution, SampledModel
 from mlci.selection import select_constraints, select_regions
 from mlci.set_evidence import SetEvidence
 from mlci.set_inference import infer_sets
@@ -93,9 +95,12 @@ __all__ = [
     "Pendulum",
     "Predicate",
     "PreparedInference",
+    "RankErrors",
     "Regions",
     "SafeSet",
     "SafetyFilter",
+    "SampledDistribution",
+    "SampledModel",
     "Selection",
     "SetEvidence",
     "SetPosterior",
@@ -121,7 +126,9 @@ __all__ = [
     "estimate_weights",
     "infer",
     "infer_sets",
+    "infer_until_settled",
     "prepare",
+    "rank_errors",
     "read_demonstrations",
     "rollout",
     "sample_sets",

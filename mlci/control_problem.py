@@ -2,7 +2,7 @@
 
 Each member of a batch minimises, over the controls u_k inside a box where there is a limit,
 
-    -sum_k r(x_k, v_k) dt + goal_weight |excess(x_K)|^2,    x_{k+1} = step(x_k, v_k),
+    -sum_k r(x_k, v_k) dt + goal_weight |goal_scale excess(x_K)|^2,    x_{k+1} = step(x_k, v_k),
 
 where r is the system's `running_reward`, `step` an integrator's step of dt, v_k = filter(x_k, u_k)
 the control that a safety filter lets through, and `excess` how far the last state is outside the
@@ -75,6 +75,7 @@ class ControlProblem:
             that is nearest to the start, at most half a turn away.
         limit: range that controls are clipped to, before the filter; None for no limit.
         integrator: how states move on.
+        goal_scale: multiplies the terminal error, or (n,) that of each dimension.
     """
 
     system: System
@@ -87,6 +88,7 @@ class ControlProblem:
     wind: bool
     limit: Box | None
     integrator: Integrator
+    goal_scale: float | Floats = 1.0
 
     @cached_property
     def limits(self) -> tuple[Floats, Floats]:
@@ -155,7 +157,7 @@ def total_cost(problem: ControlProblem, states: Floats, applied: Floats) -> Floa
     reward = problem.system.running_reward(states[:-1], applied)
     running = -np.sum(np.broadcast_to(reward, applied.shape[:-1]), axis=0) * problem.dt
     excess, _ = terminal_excess(problem, states[-1])
-    cost = running + problem.goal_weight * np.sum(np.square(excess), axis=-1)
+    cost = running + problem.goal_weight * np.sum(np.square(problem.goal_scale * excess), axis=-1)
     return np.where(np.isfinite(cost), cost, np.inf)
 
 

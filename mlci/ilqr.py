@@ -74,6 +74,7 @@ def optimize(
     limit: Box | None = None,
     integrator: Integrator = EULER,
     noise: Floats | None = None,
+    goal_scale: float | Floats = 1.0,
 ) -> Solution:
     """Solve (8) for every member of a batch, from its own first guess.
 
@@ -93,6 +94,7 @@ def optimize(
         integrator: how states move on in a time step.
         noise: (B, K, m) on the controls when the optimum is carried out. Nobody knows it before,
             and the optimum's feedback corrects what it does; limit and filter follow it.
+        goal_scale: multiplies the terminal error, or (n,) that of each dimension.
 
     Raises:
         ValueError: shapes that disagree, or a goal side with one infinite end.
@@ -101,7 +103,8 @@ def optimize(
     check_shapes(system, starts, goal_lower, goal_upper, controls)
     filter_ = NoFilter() if safety_filter is None else safety_filter
     problem = ControlProblem(
-        system, starts, goal_lower, goal_upper, dt, goal_weight, filter_, wind, limit, integrator
+        *(system, starts, goal_lower, goal_upper, dt, goal_weight, filter_, wind, limit),
+        *(integrator, goal_scale),
     )
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging candidate is not an error
         paths = _first_paths(problem, np.moveaxis(controls, 1, 0))

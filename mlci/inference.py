@@ -19,6 +19,7 @@ from mlci.evidence import PAPER, Ranking, Rates, log_evidence, rank_constraints
 from mlci.forecasts import ForecastMap, is_possible, region_sizes
 from mlci.regions import Regions
 from mlci.rule_breaking import RateEstimate, estimate_rule_breaking
+from mlci.sampling_errors import SamplingErrors
 from mlci.spaces import Bools, Floats, Ints
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ class Inference:
             entered only because of the cell in which the task starts or ends; none by default. See
             `mlci.evidence.decided_by_cell`.
         crossing: what counted as violating a hypothesis.
+        sampling: how far `avoidance` may be off; None where nothing is sampled.
 
     Raises:
         ValueError: shapes that disagree.
@@ -67,6 +69,7 @@ class Inference:
     rule_breaking: RateEstimate | None = None
     decided_by_cell: Bools = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     crossing: Crossing = ANY
+    sampling: SamplingErrors | None = None
 
     def __post_init__(self) -> None:
         shape = len(self.names), len(self.hypotheses)
@@ -161,13 +164,14 @@ class Inference:
             violated=self.violated[part],
             reachable=self.reachable[part],
             decided_by_cell=self.decided_by_cell[part],
+            sampling=self.sampling and self.sampling.of(part),
         )
         return some if self.rule_breaking is None else some.with_rule_breaking()
 
     @property
     def warnings(self) -> list[str]:
         """What a reader should know before believing the ranking."""
-        found = []
+        found = [] if self.sampling is None else self.sampling.warnings(self.names)
         if lost := [name for name, can in zip(self.names, self.reachable, strict=True) if not can]:
             found.append(
                 f"the tabular model cannot reach the goal of {', '.join(lost)}: evidence against "

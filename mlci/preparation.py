@@ -1,4 +1,4 @@
-"""From a tabular model and demonstrations to an `Inference`, in one step or in two.
+"""From a model and demonstrations to an `Inference`, in one step or in two.
 
 All that takes time depends on the tasks alone: starts, goals and durations. So `prepare` can do it
 before anybody moves, as section IV-C says; what is left when demonstrations arrive is to see which
@@ -8,20 +8,21 @@ hypotheses they violate, and to rank the others. `infer` does both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mlci.crossings import ANY, Crossing, crossed
 from mlci.demonstrations import REACHED, Demonstration, Task, departures
-from mlci.evidence import DEFAULT_MODEL_ERROR, Rates, decided_by_cell
+from mlci.evidence import DEFAULT_MODEL_ERROR, Rates
 from mlci.forecasts import ForecastMap
 from mlci.inference import Inference
-from mlci.maxent import TrajectoryDistribution
+from mlci.models import Forecast, Model, forecasters
 from mlci.regions import Regions, as_mask
+from mlci.sampling_errors import SamplingErrors
 from mlci.spaces import Bools, Floats
-from mlci.tabular import Progress, TabularModel
+from mlci.tabular import Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +34,10 @@ class PreparedInference:
         hypotheses: the C hypotheses.
         avoidance: (N, C) probability that the unconstrained agent avoids a hypothesis; 1 where it
             says nothing.
-        reachable: (N,) whether the tabular model can do the task.
+        reachable: (N,) whether the model can do the task.
         decided_by_cell: (N, C) pairs that are no evidence, see `mlci.evidence.decided_by_cell`;
             none where trajectories begin and end at cells.
+        sampling: how far `avoidance` may be off; None where nothing is sampled.
 
     Raises:
         ValueError: shapes that disagree.
@@ -46,6 +48,7 @@ class PreparedInference:
     avoidance: Floats
     reachable: Bools
     decided_by_cell: Bools
+    sampling: SamplingErrors | None = None
 
     def __post_init__(self) -> None:
         shape = len(self.tasks), len(self.hypotheses)
@@ -125,6 +128,7 @@ class PreparedInference:
             calibration,
             decided_by_cell=self.decided_by_cell[numbers],
             crossing=crossing,
+            sampling=self.sampling and self.sampling.of(numbers),
         )
 
     def _path(self, path: ArrayLike, dt: float, number: int, name: str, tolerance: float) -> Floats:
@@ -144,7 +148,7 @@ class PreparedInference:
 
 
 def infer(
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     *,
     hypotheses: ArrayLike | None = None,
@@ -161,7 +165,7 @@ def infer(
     """Rank hypotheses by demonstrations, equations (4) to (6).
 
     Args:
-        model: the tabular model.
+        model: a tabular model, or one that samples paths.
         demonstrations: N demonstrations, each with a task of its own.
         hypotheses: (C,) mask over the model's regions; None takes all.
         prior_none: prior probability that there is no constraint.
@@ -207,7 +211,7 @@ def infer(
 
 
 def prepare(
-    model: TabularModel,
+    model: Model,
     tasks: Sequence[Task],
     *,
     hypotheses: ArrayLike | None = None,
@@ -221,44 +225,29 @@ def prepare(
     Raises:
         ValueError: as of `infer`.
     """
-    count = len(model.regions)
-    mask = as_mask(hypotheses, count)
-    distributions = [
-        TrajectoryDistribution.of_task(
-            model, task, round_horizon=round_horizon, exact_ends=exact_ends
-        )
-        for task in tasks
-    ]
-    avoidance, decided = np.ones((len(tasks), count)), np.zeros((len(tasks), count), dtype=bool)
-    reachable = np.zeros(len(tasks), dtype=bool)
-    if tasks:
-        _ = model.merged  # once for all tasks
+    mask = as_mask(hypotheses, len(model.regions))
+    works = forecasters(model, tasks, round_horizon=round_horizon, exact_ends=exact_ends)
     from joblib import Parallel, delayed
 
     # Threads, as machine code does the work.
-    work = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")(
-        delayed(_avoidance_probabilities)(distribution) for distribution in distributions
+    results = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")(
+        delayed(work)() for work in works
     )
-    for j, of_task in enumerate(work):
-        reachable[j], avoidance[j], decided[j] = of_task
+    found: list[Forecast] = []
+    for forecast in results:
+        found.append(forecast)
         if progress is not None:
-            progress(j + 1, len(tasks))
+            progress(len(found), len(tasks))
+    shape = len(found), len(model.regions)
+    parts = [each.sampling for each in found if each.sampling is not None]
     return PreparedInference(
-        tuple(tasks), model.regions.select(mask), avoidance[:, mask], reachable, decided[:, mask]
+        tuple(tasks),
+        model.regions.select(mask),
+        np.reshape([each.avoidance for each in found], shape)[:, mask],
+        np.array([each.possible for each in found], dtype=bool),
+        np.array([each.decided for each in found], dtype=bool).reshape(shape)[:, mask],
+        SamplingErrors.joined(parts).select(mask) if parts else None,
     )
-
-
-def _avoidance_probabilities(distribution: TrajectoryDistribution) -> tuple[bool, Floats, Bools]:
-    """Whether a task can be done, alpha (C,), 1 if not, and what a cell decides (C,)."""
-    count = len(distribution.model.regions)
-    nothing = np.zeros(count, dtype=bool)
-    if not distribution.is_possible:
-        return False, np.ones(count), nothing
-    avoidance = distribution.avoidance_probabilities()
-    between_cells = replace(distribution, ends=None)
-    if distribution.ends is None or not between_cells.is_possible:
-        return True, avoidance, nothing
-    return True, avoidance, decided_by_cell(between_cells.avoidance_probabilities(), avoidance)
 
 
 def _violations(

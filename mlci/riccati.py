@@ -53,6 +53,7 @@ def feedback(problem: ControlProblem, paths: Paths, damping: Floats) -> tuple[Fl
         np.broadcast_to(curvature, (*batch, *curvature.shape[-2:])),
     )
     excess, sides = terminal_excess(problem, paths.states[-1])
+    sides = sides * np.square(problem.goal_scale)
     value = np.zeros((batch[1], 1 + n, 1 + n))
     value[:, 0, 1:] = value[:, 1:, 0] = 2 * problem.goal_weight * sides * excess
     value[:, 1:, 1:] = 2 * problem.goal_weight * sides[..., None] * np.eye(n)

@@ -94,6 +94,30 @@ EULER = Integrator(euler_step, euler_rate_jacobians)
 RK4 = Integrator(rk4_step, rk4_rate_jacobians)
 
 
+def in_substeps(integrator: Integrator, count: int) -> Integrator:
+    """The integrator that takes `count` equal steps of another for each of its own."""
+
+    def step(system: System, states: Floats, controls: Floats, dt: Seconds) -> Floats:
+        for _ in range(count):
+            states = integrator.step(system, states, controls, dt / count)
+        return states
+
+    def rate_jacobians(
+        system: System, states: Floats, controls: Floats, dt: Seconds
+    ) -> tuple[Floats, Floats]:
+        part, of_matrix = dt / count, np.expand_dims(dt / count, -1)
+        by_state, by_control = integrator.rate_jacobians(system, states, controls, part)
+        by_state, by_control = of_matrix * by_state, of_matrix * by_control  # of x' - x, so far
+        for _ in range(count - 1):
+            states = integrator.step(system, states, controls, part)
+            drift, push = integrator.rate_jacobians(system, states, controls, part)
+            by_control = by_control + of_matrix * (drift @ by_control + push)
+            by_state = by_state + of_matrix * (drift + drift @ by_state)
+        return by_state / (of_matrix * count), by_control / (of_matrix * count)
+
+    return Integrator(step, rate_jacobians)
+
+
 def rollout(
     system: System,
     start: ArrayLike,

@@ -3,7 +3,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mlci.differences import first_derivatives
-from mlci.simulate import EULER, RK4, euler_step, rk4_step, rollout, step_count
+from mlci.simulate import EULER, RK4, euler_step, in_substeps, rk4_step, rollout, step_count
 from mlci.systems import Pendulum, TelescopingPendulum
 
 PENDULUM = Pendulum()
@@ -50,7 +50,15 @@ def test_a_step_takes_rates_that_are_known():
     assert not np.allclose(rk4_step(PENDULUM, START, control, 0.1, 0 * rates), step)
 
 
-@pytest.mark.parametrize("integrator", [EULER, RK4], ids=["Euler", "Runge-Kutta"])
+def test_substeps_are_those_of_a_rollout():
+    path = rollout(PENDULUM, START, CONTROLS[:1], HOLD, substeps=3)
+    step = in_substeps(RK4, 3).step(PENDULUM, START, CONTROLS[0], HOLD)
+    np.testing.assert_allclose(step, path[-1], rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "integrator", [EULER, RK4, in_substeps(RK4, 3)], ids=["Euler", "Runge-Kutta", "substeps"]
+)
 def test_jacobians_of_a_step_are_those_that_differences_give(integrator):
     leg, rng, dt = TelescopingPendulum(), np.random.default_rng(1), 0.3
     states = rng.uniform(leg.space.bounds.lower, leg.space.bounds.upper, (20, 4))

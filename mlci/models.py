@@ -1,0 +1,112 @@
+"""What inference needs of a model, whether it has cells or samples paths.
+
+For each task that is how probable it is to avoid each region, and how surely that is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial, singledispatch
+
+import numpy as np
+
+from mlci.demonstrations import Task
+from mlci.evidence import decided_by_cell
+from mlci.maxent import TrajectoryDistribution
+from mlci.sampled import SampledDistribution, SampledModel
+from mlci.sampling_errors import SamplingErrors
+from mlci.spaces import Bools, Floats
+from mlci.tabular import TabularModel
+
+Model = TabularModel | SampledModel
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """What a model says of a task.
+
+    Attributes:
+        possible: whether the model can do it.
+        avoidance: (C,) alpha, the probability of avoiding each region; 1 if it is not possible.
+        decided: (C,) what only a cell decides, see `mlci.evidence.decided_by_cell`.
+        sampling: how far alpha may be off, of one task; None where nothing is sampled.
+    """
+
+    possible: bool
+    avoidance: Floats
+    decided: Bools
+    sampling: SamplingErrors | None = None
+
+
+@singledispatch
+def forecasters(
+    model: Model, tasks: Sequence[Task], *, round_horizon: bool, exact_ends: bool
+) -> list[Callable[[], Forecast]]:
+    """A function for each task that does the work and returns its forecast.
+
+    Args:
+        model: the model.
+        tasks: the tasks, which are checked at once.
+        round_horizon: take the nearest number of time steps where dt does not divide a duration.
+        exact_ends: let trajectories begin and end at states, not at cells.
+
+    Raises:
+        ValueError: a task that the model cannot describe.
+        TypeError: something that is no model.
+    """
+    raise TypeError(f"a TabularModel or a SampledModel tells of tasks, not {type(model).__name__}")
+
+
+@forecasters.register
+def _of_cells(
+    model: TabularModel, tasks: Sequence[Task], *, round_horizon: bool, exact_ends: bool
+) -> list[Callable[[], Forecast]]:
+    distributions = [
+        TrajectoryDistribution.of_task(
+            model, task, round_horizon=round_horizon, exact_ends=exact_ends
+        )
+        for task in tasks
+    ]
+    if tasks:
+        _ = model.merged  # once for all tasks
+    return [partial(_exact_forecast, distribution) for distribution in distributions]
+
+
+@forecasters.register
+def _of_samples(
+    model: SampledModel, tasks: Sequence[Task], *, round_horizon: bool, exact_ends: bool
+) -> list[Callable[[], Forecast]]:
+    if not exact_ends:
+        raise ValueError("a sampled model has no cells: its trajectories begin and end at states")
+    for task in tasks:
+        model.passage(task, round_horizon=round_horizon)
+    return [partial(_sampled_forecast, model, task, round_horizon=round_horizon) for task in tasks]
+
+
+def _exact_forecast(distribution: TrajectoryDistribution) -> Forecast:
+    """The forecast of a tabular distribution."""
+    count = len(distribution.model.regions)
+    nothing = np.zeros(count, dtype=bool)
+    if not distribution.is_possible:
+        return Forecast(False, np.ones(count), nothing)
+    avoidance = distribution.avoidance_probabilities()
+    between_cells = replace(distribution, ends=None)
+    if distribution.ends is not None and between_cells.is_possible:
+        nothing = decided_by_cell(between_cells.avoidance_probabilities(), avoidance)
+    return Forecast(True, avoidance, nothing)
+
+
+def _sampled_forecast(model: SampledModel, task: Task, *, round_horizon: bool) -> Forecast:
+    """The forecast of a task by its samples."""
+    distribution: SampledDistribution = model.distribution(task, round_horizon=round_horizon)
+    count = len(model.regions)
+    nothing, complaints = np.zeros(count, dtype=bool), (tuple(distribution.diagnosis.complaints),)
+    if not distribution.is_possible:
+        certain = np.ones((model.replicates, 1, count))
+        of_none = SamplingErrors(np.zeros((1, count)), certain, complaints)
+        return Forecast(False, np.ones(count), nothing, of_none)
+    errors = distribution.avoidance_errors()[None]
+    replicates = distribution.avoidance_replicates(model.replicates)[:, None]
+    sampling = SamplingErrors(errors, replicates, complaints)
+    return Forecast(True, distribution.avoidance_probabilities(), nothing, sampling)
