@@ -43,6 +43,7 @@ from mlci.grids import Grid
 from mlci.half_spaces import HalfSpace
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
+from mlci.next_task import NextTask, next_tasks
 from mlci.predicates import InTaskSpace, Predicate
 from mlci.preparation import PreparedInference, infer, prepare
 from mlci.rank_errors import RankErrors, infer_until_settled, rank_errors
@@ -92,6 +93,7 @@ __all__ = [
     "HalfSpace",
     "InTaskSpace",
     "Inference",
+    "NextTask",
     "Pendulum",
     "Predicate",
     "PreparedInference",
@@ -127,6 +129,7 @@ __all__ = [
     "infer",
     "infer_sets",
     "infer_until_settled",
+    "next_tasks",
     "prepare",
     "rank_errors",
     "read_demonstrations",

@@ -97,10 +97,14 @@ class Inference:
     def forecast(self) -> Floats:
         """(N, C) probability of avoiding, as it counts for evidence: calibrated, if it can be, and
         1 where a cell decides."""
-        alpha = self.avoidance
+        return self.forecast_of(self.avoidance, self.decided_by_cell)
+
+    def forecast_of(self, avoidance: Floats, decided_by_cell: Bools) -> Floats:
+        """The same of tasks that nobody did yet, from alpha (N', C) and what cells decide."""
+        alpha = avoidance
         if self.calibration is not None:
             alpha = self.calibration.avoidance(alpha, region_sizes(self.hypotheses))
-        return np.where(self.decided_by_cell, 1.0, alpha)
+        return np.where(decided_by_cell, 1.0, alpha)
 
     def with_rule_breaking(self) -> Inference:
         """The same with the rate of rule breaking that makes the demonstrations most likely."""

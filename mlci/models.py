@@ -70,7 +70,7 @@ def _of_cells(
     ]
     if tasks:
         _ = model.merged  # once for all tasks
-    return [partial(_exact_forecast, distribution) for distribution in distributions]
+    return [partial(tabular_forecast, distribution) for distribution in distributions]
 
 
 @forecasters.register
@@ -84,7 +84,7 @@ def _of_samples(
     return [partial(_sampled_forecast, model, task, round_horizon=round_horizon) for task in tasks]
 
 
-def _exact_forecast(distribution: TrajectoryDistribution) -> Forecast:
+def tabular_forecast(distribution: TrajectoryDistribution) -> Forecast:
     """The forecast of a tabular distribution."""
     count = len(distribution.model.regions)
     nothing = np.zeros(count, dtype=bool)

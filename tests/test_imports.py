@@ -99,6 +99,8 @@ MLCI = {
     "mlci.misfit": "mlci.maxent",
     "mlci.answers": "mlci.misfit mlci.soft_weight mlci.support mlci.temperature",
     "mlci.metrics": "mlci.evidence",
+    "mlci.task_outcomes": "mlci.evidence",
+    "mlci.next_task": "mlci.inference mlci.misfit mlci.models mlci.task_outcomes",
 }
 # What mlci may import of others: no configs, no formats but those of recordings, no figures.
 MATHEMATICS = "numpy scipy numba pandas pyarrow joblib pint openpyxl ezc3d"

@@ -20,6 +20,7 @@ class Purpose(IntEnum):
     RULE_BREAKING = 3
     SENSOR_NOISE = 4
     EVIDENCE = 5
+    NEXT_TASK = 6
 
 
 def stream(seed: int, purpose: Purpose, *index: int) -> np.random.Generator:

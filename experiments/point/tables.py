@@ -11,6 +11,7 @@ from experiments.point.evidence_kinds import evidence_table
 from experiments.point.forecasts import forecast_table
 from experiments.point.inference import PointInference
 from experiments.point.measures import Measures
+from experiments.point.next_task_tables import next_task_table
 from experiments.point.ranking_tables import rank_table, ranking_table
 from experiments.point.streams import Purpose, stream
 from experiments.point.trajectory_tables import (
@@ -46,7 +47,7 @@ def point_tables(
         `summary`, one row; `sampled`, `violations`, `moves` and `probabilities`, of single
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
         `dimensions` of the state, and `regions` of the truth. If asked for, `calibration`, and
-        `evidence` and `forecasts` where these are calibrated.
+        `evidence` and `forecasts` where these are calibrated; and `next_task`.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -79,6 +80,8 @@ def point_tables(
         if point.calibration is not None and settings.inference.exact_ends:
             tables["evidence"] = evidence_table(settings, point, point.calibration)
             tables["forecasts"] = forecast_table(point.calibration)
+    if settings.next_task.repetitions:
+        tables["next_task"] = next_task_table(settings, point)
     return tables
 
 

@@ -261,3 +261,20 @@ class CalibrationSettings:
         about("sets of demonstrations drawn from the tabular model; 0 asks nothing"),
     ]
     demonstrations: Annotated[Shape, about("so many demonstrations of each set are seen")]
+
+
+@dataclass(frozen=True, config=STRICT)
+class NextTaskSettings:
+    """How many demonstrations it takes if tasks are chosen for what they teach."""
+
+    repetitions: Annotated[
+        CountOrNone,
+        about(
+            "pools of kept tasks from which tasks are chosen, or taken at random; 0 asks nothing"
+        ),
+    ]
+    pool: Annotated[Count, about("kept tasks that are drawn for a pool, at most")]
+    most: Annotated[Count, about("demonstrations after which a repetition ends")]
+    samples: Annotated[
+        Count, about("trajectories drawn for each task, to tell what it is expected to teach")
+    ]

@@ -26,6 +26,7 @@ from experiments.config.settings.parts import (
     GridSettings,
     HypothesesSettings,
     InferenceSettings,
+    NextTaskSettings,
     RankSettings,
     SafetySettings,
     Shape,
@@ -121,6 +122,7 @@ class Settings(ModelSettings):
     safety: SafetySettings
     ranks: RankSettings
     calibration: CalibrationSettings
+    next_task: NextTaskSettings
     rollouts: Annotated[
         CountOrNone,
         about(

@@ -1,0 +1,177 @@
+"""How many demonstrations it takes if each task is chosen for what it teaches, or is random.
+
+The tasks are those of the point's demonstrations, and there are two sources of demonstrations.
+Those of the `demonstrator` are the study's own; those of the `model` are drawn from the tabular
+model under the truth, between cells, and the paper's evidence is right for them. Each repetition
+takes a random part of the tasks, its *pool*. A chosen task is the one of the pool that promises
+most information after the demonstrations before it (`mlci.next_task`); its own demonstration is not
+looked at. Random tasks come in random order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from experiments.config.settings import Settings
+from experiments.point.inference import PointInference
+from experiments.point.streams import Purpose, stream
+from mlci.demonstrations import Task
+from mlci.evidence import posterior, rank_scores, total_gain
+from mlci.inference import Inference
+from mlci.maxent import TrajectoryDistribution
+from mlci.next_task import plausible, simulate_tasks
+from mlci.preparation import prepare
+from mlci.spaces import Bools, Ints
+from mlci.task_outcomes import TaskOutcomes
+
+SURE = 0.95  # posterior of the truth
+EARLY = 5  # demonstrations after which the best regions and areas are compared with the truth
+
+_OF_MODEL = 2  # streams of its demonstrations; 0 and 1 are of the sources' pools
+
+COLUMNS = ["source", "repetition", "way", "tried", "sure", "settled"]
+COLUMNS += ["best_overlaps", "two_overlap", "area_overlaps"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Pool:
+    """Tasks and what there is of each.
+
+    Attributes:
+        outcomes: what a demonstration of each of N tasks may show.
+        shown: the inference from the N demonstrations of a repetition, by its number.
+    """
+
+    outcomes: list[TaskOutcomes]
+    shown: Callable[[int], Inference]
+
+
+def next_task_table(settings: Settings, point: PointInference) -> pd.DataFrame:
+    """A row a source, repetition and way to pick tasks, `chosen` or `random`.
+
+    Returns:
+        `tried`, how many demonstrations were made; `sure`, after how many the truth came first
+        with a posterior above 0.95, and `settled`, from how many on it came first until all were
+        made, both missing where that never was; and, after five, whether the best region, both of
+        the best two, and the most probable area of the credible set overlap the truth.
+    """
+    pools = {"model": _model_pool(settings, point), "demonstrator": _own_pool(settings, point)}
+    rows = []
+    for number, (source, pool) in enumerate(pools.items()):
+        for repetition in range(settings.next_task.repetitions):
+            rng = stream(settings.seed, Purpose.NEXT_TASK, number, repetition)
+            order = rng.permutation(len(pool.outcomes))[: settings.next_task.pool]
+            shown, most = pool.shown(repetition), min(settings.next_task.most, len(order))
+            for way, picked in (
+                ("chosen", _chosen(pool.outcomes, shown, order, most)),
+                ("random", order[:most]),
+            ):
+                opening = {"source": source, "repetition": repetition, "way": way, "tried": most}
+                found = _found(shown.of(picked), shown.hypotheses.inside(settings.constraint))
+                rows.append({**opening, **found, **_early(settings, shown.of(picked[:EARLY]))})
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _chosen(outcomes: list[TaskOutcomes], shown: Inference, pool: Ints, most: int) -> Ints:
+    """The tasks of a pool in the order in which they are chosen, `most` of them."""
+    left = pool.tolist()
+    picked: list[int] = []
+    for _ in range(most):
+        belief = plausible(
+            np.append(*posterior(total_gain(shown.evidence[picked]), shown.prior_none))
+        )
+        best = max(left, key=lambda number: float(outcomes[number].information(belief)))
+        left.remove(best)
+        picked.append(best)
+    return np.array(picked, dtype=np.int64)
+
+
+def _found(inference: Inference, truth: Bools) -> dict[str, float]:
+    """After how many of the demonstrations, in their order, the truth (C,) is found."""
+    count = len(inference.names)
+    if not (count and truth.any()):
+        return {"sure": np.nan, "settled": np.nan}
+    gains = np.array([total_gain(inference.evidence[: n + 1]) for n in range(count)])
+    rank = rank_scores(gains, gains > -np.inf)
+    leads = np.min(rank[:, truth], axis=1) < np.min(rank[:, ~truth], axis=1, initial=np.inf)
+    belief, _ = posterior(gains, inference.prior_none)
+    sure = leads & (np.sum(belief[:, truth], axis=1) > SURE)
+    return {
+        "sure": int(np.argmax(sure)) + 1 if sure.any() else np.nan,
+        "settled": int(np.max(np.flatnonzero(~leads), initial=-1)) + 2 if leads[-1] else np.nan,
+    }
+
+
+def _early(settings: Settings, inference: Inference) -> dict[str, float]:
+    """What of the first demonstrations' answer overlaps the truth."""
+    overlaps = inference.hypotheses.overlaps(settings.constraint)
+    if len(inference.names) < EARLY or not overlaps.any():
+        return dict.fromkeys(("best_overlaps", "two_overlap", "area_overlaps"), np.nan)
+    best, areas = overlaps[inference.order[:2]], inference.credible.areas
+    return {
+        "best_overlaps": int(best[0]),
+        "two_overlap": int(np.all(best)),
+        "area_overlaps": int(bool(areas) and np.any(overlaps[areas[0].regions])),
+    }
+
+
+def _own_pool(settings: Settings, point: PointInference) -> _Pool:
+    """The point's demonstrations, of tasks that the tabular model can do."""
+    tasks = [each.task for each in point.demonstrations]
+    simulated = _simulated(
+        settings, point, point.inference, tasks, exact_ends=settings.inference.exact_ends
+    )
+    possible = np.flatnonzero([each is not None for each in simulated])
+    shown = point.inference.of(possible)
+    return _Pool([each for each in simulated if each is not None], lambda _: shown)
+
+
+def _model_pool(settings: Settings, point: PointInference) -> _Pool:
+    """Demonstrations of the same tasks by the tabular agent under the truth, between cells."""
+    constrained, repetitions = point.model.under(point.truth), settings.next_task.repetitions
+    tasks, crossed = [], []
+    for number, demonstration in enumerate(point.demonstrations):
+        under_truth = TrajectoryDistribution.of_task(constrained, demonstration.task)
+        if under_truth.is_possible:
+            rng = stream(settings.seed, Purpose.NEXT_TASK, _OF_MODEL, number)
+            cells, moves = under_truth.sample(repetitions, rng)
+            crossed.append(point.model.crossed(cells[:, :-1], moves)[:, point.hypotheses])
+            tasks.append(demonstration.task)
+    prepared = prepare(point.model, tasks, hypotheses=point.hypotheses, exact_ends=False)
+    shown = [
+        Inference(
+            prepared.hypotheses,
+            tuple(map(str, range(len(tasks)))),
+            prepared.avoidance,
+            np.array([of_task[repetition] for of_task in crossed], dtype=bool),
+            prepared.reachable,
+            settings.inference.prior,
+        )
+        for repetition in range(repetitions if tasks else 0)
+    ]
+    simulated = _simulated(settings, point, shown[0], tasks, exact_ends=False) if shown else []
+    return _Pool([each for each in simulated if each is not None], shown.__getitem__)
+
+
+def _simulated(
+    settings: Settings,
+    point: PointInference,
+    inference: Inference,
+    tasks: list[Task],
+    *,
+    exact_ends: bool,
+) -> list[TaskOutcomes | None]:
+    """What demonstrations of tasks may show."""
+    return simulate_tasks(
+        point.model,
+        inference,
+        tasks,
+        hypotheses=point.hypotheses,
+        samples=settings.next_task.samples,
+        seed=settings.seed,
+        exact_ends=exact_ends,
+    )

@@ -1,0 +1,175 @@
+"""Which task to record next, against every trajectory of small models."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.stats import entropy as entropy_of
+from toy_models import toy_model
+
+import mlci
+from mlci.demonstrations import Task
+from mlci.evidence import PAPER, Rates
+from mlci.inference import Inference
+from mlci.next_task import entropy, nearly_the_same, next_tasks, plausible, simulate_tasks
+from mlci.spaces import Bools, Box, Floats, StateSpace
+from mlci.tabular import TabularModel
+
+STEPS, REGIONS = 5, 4
+
+
+def toy_world() -> TabularModel:
+    """Six cells, three moves of each, four regions that a move crosses rarely."""
+    rng = np.random.default_rng(7)
+    successor = rng.integers(0, 6, size=(6, 3))
+    crosses = rng.random((18, REGIONS)) < [0.05, 0.1, 0.15, 0.2]
+    return toy_model(successor, rng.normal(size=(6, 3)), np.ones((6, 3), bool), crosses)
+
+
+def task_to(goal: int) -> Task:
+    """From cell 0 into a cell of a toy world."""
+    return Task(np.array([0.5]), Box.point([goal + 0.5]), float(STEPS))
+
+
+def nothing_seen(model: TabularModel, rates: Rates = PAPER) -> Inference:
+    """The inference from no demonstration."""
+    none, count = np.zeros((0, len(model.regions))), 0
+    return Inference(
+        model.regions, (), none, none.astype(bool), np.zeros(count, dtype=bool), rates=rates
+    )
+
+
+def every_trajectory(model: TabularModel, goal: int) -> tuple[Bools, Floats]:
+    """What each trajectory from cell 0 crosses, and its probability, by listing them."""
+    crosses = model.kept.crosses.toarray().reshape(model.states, model.moves, -1)
+    crossed, weight = [], []
+    for sequence in itertools.product(range(model.moves), repeat=STEPS):
+        state, reward, row = 0, 0.0, np.zeros(REGIONS, dtype=bool)
+        for move in sequence:
+            reward += model.kept.reward[state, move]
+            row |= crosses[state, move]
+            state = model.kept.successor[state, move]
+        if state == goal:
+            crossed.append(row)
+            weight.append(np.exp(reward))
+    return np.array(crossed), np.array(weight) / np.sum(weight)
+
+
+def exact_information(model: TabularModel, goal: int, belief: Floats, rates: Rates) -> float:
+    """The mutual information of truth and D, from the distribution of D under each truth.
+
+    Under truth i its trajectories are listed, and those that cross i are left out; a share of
+    agents whom the model does not describe crosses nothing, and a share breaks rules. Where none
+    is left, the task is refused.
+    """
+    crossed, weight = every_trajectory(model, goal)
+    crossed = np.vstack([crossed, np.zeros((1, REGIONS), dtype=bool)])
+    eta, eps = rates.model_error, rates.rule_breaking
+    free = np.append((1 - eta) * weight, eta)
+    number = np.unique(crossed, axis=0, return_inverse=True)[1].ravel()
+    bins, tables = int(number.max()) + 2, []  # the last: a task that cannot be done is not done
+    for i in range(REGIONS):
+        obeying = np.where(crossed[:, i], 0.0, free)
+        refused = np.sum(obeying) == 0
+        obeying = obeying / (1.0 if refused else np.sum(obeying))
+        tables.append(np.bincount(number, (1 - eps) * obeying + eps * free, bins))
+        tables[-1][-1] = (1 - eps) * refused
+    tables.append(np.bincount(number, free, bins))
+    mixture = belief @ np.array(tables)
+    return float(entropy_of(mixture) - belief @ entropy_of(tables, axis=1))
+
+
+@pytest.mark.parametrize("rates", [PAPER, Rates(0.1), Rates(0.1, 0.1)])
+def test_information_is_exact_but_for_sampling(rates: Rates) -> None:
+    """2000 trajectories a task: within four of the standard errors that are stated."""
+    model = toy_world()
+    goals = [goal for goal in range(6) if goal in model.kept.successor]
+    inference = nothing_seen(model, rates)
+    belief = np.append(inference.posterior, inference.posterior_none)
+    simulated = simulate_tasks(
+        model, inference, [task_to(goal) for goal in goals], samples=2000, exact_ends=False
+    )
+    some = 0
+    for goal, outcomes in zip(goals, simulated, strict=True):
+        exact = exact_information(model, goal, belief, rates)
+        error = outcomes.error(belief)
+        assert error < 0.1 * max(exact, 0.05)
+        assert outcomes.information(belief) == pytest.approx(exact, abs=4 * error + 1e-9)
+        some += exact > 0.01
+    assert some > 2
+
+
+def test_the_first_task_is_the_most_informative_by_enumeration() -> None:
+    model = toy_world()
+    inference = nothing_seen(model)
+    belief = np.append(inference.posterior, inference.posterior_none)
+    exact = [exact_information(model, goal, belief, PAPER) for goal in (1, 2, 3)]
+    best, second = np.argsort(exact)[::-1][:2]
+    assert exact[best] > 1.1 * exact[second]  # sampling cannot turn them round
+    first = next_tasks(
+        model, inference, [task_to(goal) for goal in (1, 2, 3)], samples=2000, exact_ends=False
+    )[0]
+    assert first.number == best
+    assert first.information == pytest.approx(exact[best], abs=4 * first.error)
+    assert first.information <= entropy(belief)
+
+
+def test_a_batch_repeats_no_task_and_adds_less_with_each() -> None:
+    system = mlci.Pendulum()
+    hypotheses = mlci.Regions.from_grid(system.space, (5, 5))
+    model = mlci.discretize(
+        system, mlci.Grid(system.space, (15, 15)), mlci.action_grid(system, 5), 0.5, hypotheses
+    )
+    rng = np.random.default_rng(0)
+    ends = rng.uniform([0, -2], [2 * np.pi, 2], (12, 2, 2))
+    tasks = [Task(start, Box.point(goal), 4.0) for start, goal in ends]
+    inference = nothing_seen(model, Rates(0.1))
+    alone = next_tasks(model, inference, tasks, count=1)[0]
+    twice = [*tasks, Task(alone.task.start + 0.01, alone.task.goal, 4.0)]
+    batch = next_tasks(model, inference, twice, count=3)
+    assert batch[0].information >= batch[1].information >= batch[2].information > 0
+    numbers = [each.number for each in batch]
+    assert (
+        len({number % len(tasks) if number == alone.number else number for number in numbers}) == 3
+    )
+    assert not {alone.number, len(tasks)} <= set(numbers)
+    again = next_tasks(model, inference, twice, count=3)
+    assert [each.number for each in again] == numbers
+
+
+def test_tasks_that_the_model_cannot_do_are_passed_over() -> None:
+    model = toy_model(
+        np.array([[1], [0]]), np.zeros((2, 1)), np.ones((2, 1), bool), np.ones((2, 1), bool)
+    )
+    inference = nothing_seen(model)
+    odd = Task(np.array([0.5]), Box.point([0.5]), 3.0)  # after three moves it is in the other cell
+    assert next_tasks(model, inference, [odd], exact_ends=False) == []
+    even = Task(np.array([0.5]), Box.point([0.5]), 2.0)
+    chosen = next_tasks(model, inference, [odd, even], exact_ends=False)
+    assert [each.number for each in chosen] == [1]
+    with pytest.raises(ValueError, match="at least one trajectory"):
+        next_tasks(model, inference, [even], samples=0)
+
+
+def test_what_is_left_out_as_implausible_holds_a_thousandth() -> None:
+    belief = np.array([0.6, 0.0004, 0.0005, 0.0002, 0.3989])
+    kept = plausible(belief)
+    assert kept.sum() == pytest.approx(1)
+    assert np.array_equal(kept > 0, [True, False, True, False, True])
+
+
+def test_tasks_are_nearly_the_same_the_short_way_round() -> None:
+    space = StateSpace(Box([0.0, -1.0], [10.0, 1.0]), [True, False], ("angle", "speed"))
+
+    def task(start: list[float], goal: list[float]) -> Task:
+        return Task(np.array(start), Box.point(goal), 1.0)
+
+    one = task([0.1, 0.0], [5.0, 0.0])
+    assert nearly_the_same(space, one, task([9.9, 0.1], [5.5, 0.1]))
+    assert not nearly_the_same(space, one, task([8.9, 0.1], [5.5, 0.1]))
+    assert not nearly_the_same(space, one, task([0.1, 0.0], [5.0, 0.3]))
+    free = Task(np.array([0.1, 0.0]), Box([5.0, -np.inf], [5.0, np.inf]), 1.0)
+    assert nearly_the_same(space, free, free)
+    assert not nearly_the_same(space, one, free)
