@@ -21,6 +21,7 @@ from experiments.tracking.study_tables import TableError, read_tables
 from paper_figures import (
     calibration_diagram,
     choice_effects,
+    chosen_tasks,
     final_state_error,
     forecast_diagram,
     hypothesis_map,
@@ -63,6 +64,7 @@ FIGURES: Mapping[str, ModuleType] = {
         readings,
         wrong_model,
         rule_breaking,
+        chosen_tasks,
         success,
         success_cases,
     )

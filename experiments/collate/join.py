@@ -18,6 +18,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.collate.cases import case_names, case_table
+from experiments.collate.chosen_tasks import chosen_tasks, early_overlap, unfound
 from experiments.collate.evidence_kinds import evidence_kinds
 from experiments.collate.examples import example_tables
 from experiments.collate.finished import CollateError, FinishedPoint
@@ -156,6 +157,10 @@ def _made_tables(
         made["reliability"] = reliability(pd.read_csv(joined["calibration"]))
     if "evidence" in joined:
         made["evidence_kinds"] = evidence_kinds(pd.read_csv(joined["evidence"]))
+    if "next_task" in joined:
+        table = pd.read_csv(joined["next_task"])
+        made["chosen_tasks"], made["unfound"] = chosen_tasks(table), unfound(table)
+        made["early_overlap"] = early_overlap(table)
     cases = case_table(joined["summary"], [point.identity for point in points], names)
     return made if cases is None else {**made, "cases": cases}
 

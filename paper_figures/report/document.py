@@ -16,6 +16,7 @@ from paper_figures.report import (
     claim_6,
     section_beliefs,
     section_choices,
+    section_chosen_tasks,
     section_control_noise,
     section_costs,
     section_evidence,
@@ -132,6 +133,11 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         "Evidence, and forecasts that come true",
         section_evidence.section,
         (Figure("calibration", "forecast_diagram", "Share that is crossed against its forecast."),),
+    ),
+    (
+        "What to record next",
+        section_chosen_tasks.section,
+        (Figure("next_task", "chosen_tasks", "Who has not found the truth yet, task after task."),),
     ),
     (
         "In-cell sampling at 100 cells",
