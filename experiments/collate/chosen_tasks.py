@@ -129,7 +129,7 @@ def _groups(next_task: pd.DataFrame) -> Iterator[tuple[dict[str, object], pd.Dat
 def _resampled(group: pd.DataFrame, key: list[str]) -> Floats:
     """(B, R) how often each repetition, in its order, counts in each resample."""
     repetitions = group[group["way"] == WAYS[0]]
-    sizes = repetitions.groupby(["truth", LAST_OPENING], sort=True).size().to_numpy(dtype=np.int64)
+    sizes = np.asarray(repetitions.groupby(["truth", LAST_OPENING]).size(), dtype=np.int64)
     return resamples(sizes, key).astype(float)
 
 
