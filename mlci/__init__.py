@@ -36,6 +36,7 @@ from mlci.crossings import Crossing
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.diagnosis import Diagnosis, diagnose
+from mlci.exploration import explore
 from mlci.first_exit import FirstExit
 from mlci.fixed_horizon import FixedHorizon
 from mlci.forecasts import ForecastMap
@@ -126,6 +127,7 @@ __all__ = [
     "discretize",
     "enumerate_sets",
     "estimate_weights",
+    "explore",
     "infer",
     "infer_sets",
     "infer_until_settled",

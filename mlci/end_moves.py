@@ -14,9 +14,10 @@ import numpy as np
 import scipy  # loads scipy.sparse when it is first used
 
 from mlci.merged_moves import MergedMoves
+from mlci.paths import follow
 from mlci.simulate import rollout
 from mlci.spaces import Box, Floats, Ints
-from mlci.tabular import TabularModel, follow
+from mlci.tabular import TabularModel
 
 # Of L moves: the cell (L,) that each begins in, its reward (L,) [nat] and its path (L, K+1, n).
 MovePaths = tuple[Ints, Floats, Floats]

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mlci.joint_avoidance import log_avoidance_beside
-from mlci.merged_moves import MergedMoves
+from mlci.merged_moves import MergedMoves, run_begins
 from mlci.recursions import Leg, backward_pass, reachable_cells
 from mlci.spaces import Bools, Floats, Ints
 from mlci.tables import Table
@@ -116,10 +116,10 @@ class FixedHorizon:
         regions = crosses.indices[np.repeat(~staying, np.diff(crosses.indptr))]
         return (
             MergedMoves(
-                begins=_begins(moves.sum(axis=1)),
+                begins=run_begins(moves.sum(axis=1)),
                 successor=successor[moves].astype(np.int32),
                 log_weight=reward[moves],
-                crossing_begins=_begins(count),
+                crossing_begins=run_begins(count),
                 crossing_region=regions.astype(np.int32),
             ),
             0,
@@ -130,8 +130,3 @@ class FixedHorizon:
         """Raise where there is no distribution."""
         if np.any(stuck := self.log_z[0, starts] == -np.inf):
             raise ValueError(f"no trajectory from {starts[stuck].tolist()} ends in a goal")
-
-
-def _begins(counts: Ints) -> Ints:
-    """(Q+1,) where each of Q runs begins in an array of all, and where the last one ends."""
-    return np.append(0, np.cumsum(counts)).astype(np.int64)

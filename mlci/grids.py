@@ -105,7 +105,11 @@ class Grid:
         """(S, samples^n, n): the centres of a regular subdivision of every cell, or of some."""
         ticks = (np.arange(samples) + 0.5) / samples - 0.5
         offsets = np.stack(np.meshgrid(*[ticks] * len(self.shape), indexing="ij"), axis=-1)
-        return self.centers[cells, None, :] + offsets.reshape(-1, len(self.shape)) * self.widths
+        numbers = np.arange(self.size)[cells] if isinstance(cells, slice) else cells
+        places = np.unravel_index(numbers, self.shape)
+        centers = [axis[place] for axis, place in zip(self.axes, places, strict=True)]
+        around = offsets.reshape(-1, len(self.shape)) * self.widths
+        return np.stack(centers, axis=-1)[:, None, :] + around
 
     def cells_in(self, region: Box) -> Ints:
         """Numbers of the cells that a region meets, sorted; empty if it is outside.

@@ -122,7 +122,7 @@ class TrajectoryDistribution:
     def reachable(self) -> Bools:
         """(T+1, S) cells that can be occupied at each step, whether or not a goal follows."""
         if self.ends is None:
-            return reachable_cells(self.model.merged, [self.start], self.steps)
+            return self._reached(self.steps)
         reached = np.zeros((self.steps + 1, self.model.states), dtype=bool)
         reached[0, self.start] = True
         if self.steps > 1:
@@ -135,8 +135,29 @@ class TrajectoryDistribution:
     @cached_property
     def _between(self) -> Bools:
         """(T-1, S) cells that can be occupied after 1 .. T-1 moves from the exact start."""
-        starts = self.start_moves.allowed_successors
-        return reachable_cells(self.model.merged, starts, self.steps - 2)
+        return self._reached(self.steps - 2)
+
+    @property
+    def first_cells(self) -> tuple[Ints, int]:
+        """Cells from which moves of the table are taken first, and how many moves are left there:
+        with exact ends those after the first move, as far as the truth allows it."""
+        if self.ends is None:
+            return np.array([self.start]), self.steps
+        return np.unique(self.start_moves.allowed_successors), self.steps - 1
+
+    def _reached(self, moves: int) -> Bools:
+        """(moves + 1, S) cells that can be occupied after moves of the table.
+
+        Raises:
+            ValueError: the model was explored for other tasks.
+        """
+        (starts, steps), explored = self.first_cells, self.model.explored
+        if explored is not None and not explored.serves(starts, steps, self.goal):
+            raise ValueError(
+                f"the model was explored for other tasks than that from cell {self.start} in "
+                f"{self.steps} steps: explore(model, tasks) takes all that it is for"
+            )
+        return reachable_cells(self.model.merged, starts, moves)
 
     @cached_property
     def start_moves(self) -> MergedMoves:

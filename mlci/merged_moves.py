@@ -7,7 +7,7 @@ where it has one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -51,6 +51,19 @@ class MergedMoves:
         """The same with rewards times a factor, as at another temperature; no two are merged."""
         return replace(self, log_weight=self.log_weight * factor)
 
+    def placed(self, cells: Ints, states: int) -> MergedMoves:
+        """The moves of Q cells as those of cells (Q,) among S, the others of which have none."""
+        count, order = np.zeros(states, dtype=np.int64), np.argsort(cells)
+        count[cells] = np.diff(self.begins)
+        move = _entries(self.begins, order)
+        return MergedMoves(
+            run_begins(count),
+            self.successor[move],
+            self.log_weight[move],
+            run_begins(np.diff(self.crossing_begins)[move]),
+            self.crossing_region[_entries(self.crossing_begins, move)],
+        )
+
     def crosses(self, moves: Ints, regions: int) -> Bools:
         """(L, C) which of the C regions some merged moves (L,) cross."""
         crossed = np.zeros((len(moves), regions), dtype=bool)
@@ -79,34 +92,58 @@ def merge_moves(blocks: Iterable[SingleMoves]) -> MergedMoves:
     Args:
         blocks: the moves of consecutive cells; one block is held at a time.
     """
-    parts = []
-    for block in blocks:
-        crosses = block.crosses
-        crosses.sort_indices()
-        begins, region = crosses.indptr.astype(np.int64), crosses.indices.astype(np.int32)
-        cells, moves = block.successor.shape
-        ends, first = np.zeros(cells + 1, dtype=np.int64), np.empty(cells * moves, dtype=np.int64)
-        log_weight, total = np.full(cells * moves, -np.inf), np.zeros(cells * moves)
-        table = np.full(1 << (2 * moves - 1).bit_length(), -1)
-        room = total, table, np.empty(moves, dtype=np.int64)
-        _merge(block.successor, block.reward, begins, region, room, ends, first, log_weight)
-        first, log_weight = first[: ends[-1]], log_weight[: ends[-1]].copy()
-        chosen = crosses[first]
-        parts.append(
-            {
-                "begins": np.diff(ends),
-                "successor": block.successor.ravel()[first],
-                "log_weight": log_weight,
-                "crossing_begins": np.diff(chosen.indptr),
-                "crossing_region": chosen.indices.astype(np.int32),
-            }
-        )
-    arrays: dict[str, Any] = {}
-    for name in list(parts[0]):  # each set of parts goes before the next is joined
-        arrays[name] = np.concatenate([part.pop(name) for part in parts])
-        if name.endswith("begins"):
-            arrays[name] = np.append(0, np.cumsum(arrays[name], dtype=np.int64))
-    return MergedMoves(**arrays)
+    return joined([_merged(block) for block in blocks])
+
+
+def joined(parts: Sequence[MergedMoves]) -> MergedMoves:
+    """The merged moves of the cells of all parts, in order."""
+
+    def all_of(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    def counts(name: str) -> Ints:
+        return np.concatenate([np.diff(getattr(part, name)) for part in parts])
+
+    return MergedMoves(
+        run_begins(counts("begins")),
+        all_of("successor"),
+        all_of("log_weight"),
+        run_begins(counts("crossing_begins")),
+        all_of("crossing_region"),
+    )
+
+
+def run_begins(counts: Ints) -> Ints:
+    """(Q+1,) where each of Q runs begins in an array of all, and where the last one ends."""
+    return np.append(0, np.cumsum(counts, dtype=np.int64))
+
+
+def _entries(begins: Ints, runs: Ints) -> Ints:
+    """The places of all entries of some runs, one after the other."""
+    count = np.diff(begins)[runs]
+    first = begins[runs] - run_begins(count)[:-1]
+    return np.arange(np.sum(count)) + np.repeat(first, count)
+
+
+def _merged(block: SingleMoves) -> MergedMoves:
+    """The merged moves of the cells of a block."""
+    crosses = block.crosses
+    crosses.sort_indices()
+    begins, region = crosses.indptr.astype(np.int64), crosses.indices.astype(np.int32)
+    cells, moves = block.successor.shape
+    ends, first = np.zeros(cells + 1, dtype=np.int64), np.empty(cells * moves, dtype=np.int64)
+    log_weight, total = np.full(cells * moves, -np.inf), np.zeros(cells * moves)
+    table = np.full(1 << (2 * moves - 1).bit_length(), -1)
+    room = total, table, np.empty(moves, dtype=np.int64)
+    _merge(block.successor, block.reward, begins, region, room, ends, first, log_weight)
+    first = first[: ends[-1]]
+    return MergedMoves(
+        ends,
+        block.successor.ravel()[first],
+        log_weight[: ends[-1]].copy(),
+        run_begins(np.diff(begins)[first]),
+        region[_entries(begins, first)],
+    )
 
 
 @compiled("b1(i8[::1], i4[::1], i8, i8)")

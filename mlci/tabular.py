@@ -23,20 +23,19 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-import scipy  # loads scipy.sparse when it is first used
 from numpy.typing import ArrayLike
 
+from mlci.explored import Explored
 from mlci.grids import Grid
 from mlci.merged_moves import MergedMoves, merge_moves
+from mlci.paths import PATHS_AT_ONCE, follow, substep_count
 from mlci.regions import Regions, as_mask
 from mlci.simulate import rollout
 from mlci.single_moves import SingleMoves
 from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.systems import System
 
-_CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the curve it stands for
 _MOVES_AT_ONCE = 1 << 17  # what a step of long work holds beside its result: about 100 MB
-_PATHS_AT_ONCE = 1 << 13  # which the second level of cache nearly holds
 MOST_KEPT = 1 << 24  # moves: half a gigabyte
 
 Progress = Callable[[int, int], None]  # called with how much is done, and of how much
@@ -60,6 +59,7 @@ class TabularModel:
         kept: the moves of all cells, whether or not the truth forbids them. None follows the
             dynamics anew where moves are asked for, in less memory; a model whose cells and moves
             stand for no dynamics has to keep them.
+        explored: the cells whose moves `merged` has; None for all.
 
     Raises:
         ValueError: moves of another shape or to no cell, or a dt that is not positive.
@@ -74,6 +74,7 @@ class TabularModel:
     temperature: float = 1.0
     truth: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
     kept: SingleMoves | None = None
+    explored: Explored | None = None
 
     def __post_init__(self) -> None:
         if not len(self.truth):
@@ -124,7 +125,7 @@ class TabularModel:
         """All moves of some cells (Q,), whether or not the truth forbids them."""
         if self.kept is not None:
             return self.kept.of(cells)
-        size = max(1, _PATHS_AT_ONCE // self.moves)
+        size = max(1, PATHS_AT_ONCE // self.moves)
         firsts = range(0, max(1, len(cells)), size)
         return SingleMoves.joined([self._follow(cells[first : first + size]) for first in firsts])
 
@@ -147,19 +148,28 @@ class TabularModel:
         path = rollout(self.system, inside, controls[:, :, None, :], self.dt, self.substeps)
         end, crosses = follow(self.grid, self.regions, path.reshape(-1, *path.shape[-2:]))
         # Numpy is fast where an action is applied to many states; a cell's moves belong together.
-        order = np.arange(len(end)).reshape(len(controls), len(cells), -1).swapaxes(0, 1).ravel()
-        reward = np.broadcast_to(self.move_reward(inside, controls), path.shape[:2]).ravel()
         shape = len(cells), self.moves
+        by_action = np.arange(len(end)).reshape(
+            len(controls), len(cells), shape[1] // len(controls)
+        )
+        order = by_action.swapaxes(0, 1).ravel()
+        reward = np.broadcast_to(self.move_reward(inside, controls), path.shape[:2]).ravel()
         return SingleMoves(end[order].reshape(shape), reward[order].reshape(shape), crosses[order])
 
     @cached_property
     def merged(self) -> MergedMoves:
         """The moves of each cell, those with the same successor and crossings merged."""
-        return merge_moves(self.moves_of(cells) for cells in self.blocks()).under(self.truth)
+        merged = merge_moves(self.moves_of(cells) for cells in self.blocks())
+        if self.explored is not None:
+            merged = merged.placed(np.flatnonzero(self.explored.cells), self.states)
+        return merged.under(self.truth)
 
     def blocks(self, cells: Ints | None = None) -> Iterator[Ints]:
-        """Some cells, or all, in blocks of so many moves as one step of work should hold."""
-        cells = np.arange(self.states) if cells is None else cells
+        """Some cells, or all that are explored, in blocks of so many moves as one step of work
+        should hold."""
+        if cells is None:
+            known = self.explored
+            cells = np.arange(self.states) if known is None else np.flatnonzero(known.cells)
         size = max(1, _MOVES_AT_ONCE // self.moves)
         for first in range(0, max(1, len(cells)), size):
             yield cells[first : first + size]
@@ -228,6 +238,11 @@ def action_grid(
     return np.stack([part.ravel() for part in np.meshgrid(*ticks, indexing="ij")], axis=-1)
 
 
+def moves_are_kept(cells: float, moves: float) -> bool:
+    """Whether `discretize` keeps each of the moves of so many cells, or the merged ones alone."""
+    return cells * moves <= MOST_KEPT
+
+
 def discretize(
     system: System,
     grid: Grid,
@@ -263,38 +278,9 @@ def discretize(
             if progress is not None:
                 progress(int(cells[-1]) + 1, grid.size)
 
-    if model.states * model.moves > MOST_KEPT:
+    if not moves_are_kept(model.states, model.moves):
         vars(model)["merged"] = merge_moves(blocks())
         return model
     full = replace(model, kept=SingleMoves.joined(list(blocks())))
     vars(full)["substeps"] = model.substeps  # counted once
     return full
-
-
-def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int:
-    """Integrator steps a move, so that chords stay close to the curve they stand for.
-
-    A chord over time t strays |x''| t^2 / 8 from its curve, with x'' = dh/dx h under a held
-    control; and no chord may span a quarter of a period, for the short way round to be its own.
-    """
-    shortest = dt
-    quarter = np.where(grid.space.periodic, grid.space.bounds.widths / 4, np.inf)
-    controls, parts = actions[:, None, :], 1 + grid.size * len(actions) // _PATHS_AT_ONCE
-    for states in np.array_split(grid.centers, min(parts, grid.size)):
-        speed = system.dynamics(states, controls)
-        by_state, _ = system.jacobians(states, controls)
-        bend = np.max(np.abs(np.einsum("...ij,...j->...i", by_state, speed)), axis=(0, 1))
-        with np.errstate(divide="ignore"):
-            shortest = min(
-                shortest,
-                float(np.min(np.sqrt(8 * _CHORD_ERROR * grid.widths / bend))),
-                float(np.min(quarter / np.max(np.abs(speed), axis=(0, 1)))),
-            )
-    return int(np.ceil(dt / shortest - 1e-9))
-
-
-def follow(grid: Grid, regions: Regions, path: Floats) -> tuple[Ints, scipy.sparse.csr_matrix]:
-    """Successor (-1 where the path leaves the space) and crossings of paths (Q, K+1, n)."""
-    stays = np.all(grid.space.contains(path), axis=-1)
-    successor = np.where(stays, grid.index(path[:, -1]), -1)
-    return successor, regions.crossings(path[:, :-1], np.diff(path, axis=1), stays)

@@ -7,7 +7,7 @@ import os
 
 from experiments.config.settings import ModelSettings, Settings
 from mlci.recursions import ALPHA_BYTES
-from mlci.tabular import MOST_KEPT
+from mlci.tabular import moves_are_kept
 
 # Measured on points of 0.4 to 4 million moves, and `python -m tests.benchmark` compares: a move has
 # successor, reward, its place among the cell's successors and the regions that it crosses, and most
@@ -28,7 +28,7 @@ def expected_memory(settings: ModelSettings) -> float:
     actions = math.prod(settings.action_counts)
     moves = actions * settings.transition.samples**dimensions
     merged = min(moves, _MERGED_AN_ACTION * actions)
-    is_kept = float(cells) * moves <= MOST_KEPT
+    is_kept = moves_are_kept(float(cells), moves)
     hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
     hypotheses += len(settings.hypotheses.boxes)
     steps = settings.horizon / settings.dt if isinstance(settings, Settings) else 0

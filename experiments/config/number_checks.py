@@ -18,7 +18,7 @@ from experiments.config.settings import (
     Settings,
     StudySettings,
 )
-from mlci.tabular import MOST_KEPT
+from mlci.tabular import MOST_KEPT, moves_are_kept
 
 _MOST_STEPS = 100_000
 _LONGEST_NAME = 200  # letters of a study; files of 255 bytes are named after it
@@ -84,7 +84,7 @@ def soft_problems(settings: RecordedSettings) -> Iterator[str]:
     """Weights need every single move, which a large model does not keep."""
     moves = settings.transition.samples ** len(settings.grid.shape)
     moves *= math.prod(settings.grid.shape) * math.prod(settings.action_counts)
-    if settings.soft and moves > MOST_KEPT:
+    if settings.soft and not moves_are_kept(1, moves):
         yield (
             f"soft: {settings.soft}, but a weight needs every single move, and {moves} are more "
             f"than the {MOST_KEPT} that are kept; use fewer cells, actions or samples, or soft=0"

@@ -26,7 +26,7 @@ from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
 from mlci.single_moves import SingleMoves
 from mlci.systems import System
-from mlci.tabular import MOST_KEPT, TabularModel, discretize
+from mlci.tabular import TabularModel, discretize, moves_are_kept
 
 # What is stored of the moves of a tabular model, and of the sparse matrix of their crossings.
 _MOVES = ("successor", "reward")
@@ -77,7 +77,7 @@ def tabular_model(settings: Settings, store: Store) -> TabularModel:
         samples=settings.transition.samples,
         temperature=settings.temperature,
     )
-    if model.states * model.moves > MOST_KEPT:
+    if not moves_are_kept(model.states, model.moves):
         return _discretize(settings, model.regions)
     stored = _discretized(settings, store, "mdp", hypotheses, (*_MOVES, *_CROSSINGS))
     # Apart, so that points which differ in the truth share what takes the time.

@@ -40,13 +40,15 @@ class TwoLinkArm(System):
         return Box(np.full(2, -self.rate_limit), np.full(2, self.rate_limit))
 
     def dynamics(self, states: Floats, controls: Floats) -> Floats:
+        rates = np.empty((6, *np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])))
         _, elbow, w1, w2, torque_1, torque_2 = np.moveaxis(states, -1, 0)
         bend, swirl = self.coupled * np.cos(elbow), self.coupled * np.sin(elbow)
         both, across = self.base + 2 * bend, self.outer + bend
         push_1 = torque_1 + swirl * w2 * (2 * w1 + w2)
         push_2 = torque_2 - swirl * np.square(w1)
         scale = 1 / (both * self.outer - np.square(across))
-        turn_1 = scale * (self.outer * push_1 - across * push_2)
-        turn_2 = scale * (both * push_2 - across * push_1)
-        rates = w1, w2, turn_1, turn_2, controls[..., 0], controls[..., 1]
-        return np.moveaxis(np.stack(np.broadcast_arrays(*rates)), 0, -1)
+        rates[0], rates[1] = w1, w2
+        rates[2] = scale * (self.outer * push_1 - across * push_2)
+        rates[3] = scale * (both * push_2 - across * push_1)
+        rates[4], rates[5] = controls[..., 0], controls[..., 1]
+        return np.moveaxis(rates, 0, -1)

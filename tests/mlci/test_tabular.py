@@ -15,10 +15,11 @@ from mlci.diagnosis import diagnose
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.misfit import sample_crossings
+from mlci.paths import substep_count
 from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator, FunctionSystem, Pendulum, System
-from mlci.tabular import TabularModel, action_grid, discretize, substep_count
+from mlci.tabular import TabularModel, action_grid, discretize
 
 
 def reference_segment(system: System, start: np.ndarray, control: np.ndarray, dt: float):
@@ -160,7 +161,7 @@ def test_blocks_of_cells_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) ->
     )
     whole = discretize(*arguments, samples=2)
     monkeypatch.setattr("mlci.tabular._MOVES_AT_ONCE", 50)
-    monkeypatch.setattr("mlci.tabular._PATHS_AT_ONCE", 30)
+    monkeypatch.setattr("mlci.tabular.PATHS_AT_ONCE", 30)
     told: list[tuple[int, int]] = []
     pieces = discretize(*arguments, samples=2, progress=lambda *count: told.append(count))
     np.testing.assert_array_equal(whole.kept.successor, pieces.kept.successor)
