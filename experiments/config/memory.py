@@ -30,7 +30,7 @@ def expected_memory(settings: ModelSettings) -> float:
     merged = min(moves, _MERGED_AN_ACTION * actions)
     is_kept = moves_are_kept(float(cells), moves)
     hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
-    hypotheses += len(settings.hypotheses.boxes)
+    hypotheses += settings.hypotheses.count
     steps = settings.horizon / settings.dt if isinstance(settings, Settings) else 0
     return (
         float(cells) * (moves * _BYTES_A_MOVE if is_kept else merged * _BYTES_A_MERGED_MOVE)

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from experiments.config.settings import SystemSettings, system_class
+from experiments.config.settings import ShapeSettings, SystemSettings, system_class
 from experiments.config.settings.kinds import LIST, ONE, WORD
 from experiments.config.suggestions import did_you_mean
 from experiments.tracking.own_modules import put_on_path
@@ -40,6 +40,16 @@ _WORDS = {
     "problem": "{words}",
 }
 
+# By the name of a class whose values are groups.
+_EXAMPLES = {
+    "Region": "is not a region; write its ends in each dimension, such as {lower: [3.1, -0.1], "
+    "upper: [3.2, 0.1]}",
+    "BallSettings": "is not a ball; write its centre and semi-axes, such as {center: [3.1, 0.0], "
+    "radii: [0.2, 0.5]}",
+    "HalfSpaceSettings": "is not a half-space; write {normal: [0.0, 1.0], offset: 0.5} for what "
+    "is above 0.5 in the second dimension",
+}
+
 
 def checked(kind: type[T], tree: Mapping[str, Any]) -> T:
     """A tree of plain values as settings; its system may be of the current folder's modules.
@@ -47,9 +57,7 @@ def checked(kind: type[T], tree: Mapping[str, Any]) -> T:
     Raises:
         ConfigError: with a line for each value that does not fit.
     """
-    system = tree.get("system")
-    target = system.get("_target_") if isinstance(system, Mapping) else None
-    if isinstance(target, str):
+    for target in _targets(tree):
         put_on_path(target)
     try:
         return TypeAdapter(kind).validate_python(_without_missing(tree))
@@ -57,12 +65,23 @@ def checked(kind: type[T], tree: Mapping[str, Any]) -> T:
         raise ConfigError("\n".join(_lines(error, kind, tree))) from None
 
 
+def _targets(tree: Any) -> Iterator[str]:
+    """Every `_target_` in a tree."""
+    if isinstance(tree, Mapping):
+        if isinstance(target := tree.get("_target_"), str):
+            yield target
+        tree = list(tree.values())
+    if isinstance(tree, list | tuple):
+        for part in tree:
+            yield from _targets(part)
+
+
 def field_keys(kind: Any, prefix: str = "") -> list[str]:
     """Dotted names of a dataclass's fields, and of the fields of those that hold dataclasses."""
     keys = []
     for name, hint in typing.get_type_hints(kind).items():
         keys.append(prefix + name)
-        if (group := _group(hint)) and group is not SystemSettings:
+        if (group := _group(hint)) and group not in (SystemSettings, ShapeSettings):
             keys += field_keys(group, f"{prefix}{name}.")
     return keys
 
@@ -79,11 +98,8 @@ def _lines(error: ValidationError, kind: Any, tree: Mapping[str, Any]) -> Iterat
         elif each["type"] == "missing" and place[0] == "system" and "system" in tree:
             name = tree["system"]["_target_"].rpartition(".")[2]
             yield f"{key}: missing; {name} needs it"
-        elif each["type"] == "dataclass_type" and each["ctx"]["class_name"] == "Region":
-            yield (
-                f"{key}: {_short(each['input'])} is not a region; write its ends in each "
-                "dimension, such as {lower: [3.1, -0.1], upper: [3.2, 0.1]}"
-            )
+        elif each["type"] == "dataclass_type" and each["ctx"]["class_name"] in _EXAMPLES:
+            yield f"{key}: {_short(each['input'])} {_EXAMPLES[each['ctx']['class_name']]}"
         elif each["type"] in _WORDS:
             details = {**each.get("ctx", {}), "value": _short(each["input"])}
             yield f"{key}: " + _WORDS[each["type"]].format(**details)

@@ -89,9 +89,16 @@ def settings_of_record(config: Mapping[str, Any]) -> Settings:
     Raises:
         ConfigError: listing every problem, as where settings have changed since.
     """
-    system = config["system"]
-    written = {"_target_": system["target"], **system["arguments"]}
-    return checked(Settings, {**config, "system": written})
+    return checked(Settings, _written(config))
+
+
+def _written(tree: Any) -> Any:
+    """A tree of a record as one writes it: with `_target_` and arguments beside it."""
+    if isinstance(tree, Mapping):
+        if tree.keys() == {"target", "arguments"}:
+            return {"_target_": tree["target"], **tree["arguments"]}
+        return {key: _written(part) for key, part in tree.items()}
+    return [_written(part) for part in tree] if isinstance(tree, list | tuple) else tree
 
 
 def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:

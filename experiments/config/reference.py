@@ -51,12 +51,13 @@ def schema(command: str) -> dict[str, Any]:
     tree = TypeAdapter(COMMANDS[command]).json_schema(schema_generator=_WithMultiplesOfPi)
     for node in (tree, *tree["$defs"].values()):
         node.pop("required", None)
-    target = tree["$defs"]["SystemSettings"]["properties"]["target"]
-    tree["$defs"]["SystemSettings"] = {
-        "type": "object",
-        "properties": {"_target_": {**target, "title": "Target"}},
-        "additionalProperties": True,  # what the class takes
-    }
+    for kind in ("SystemSettings", "ShapeSettings"):
+        target = tree["$defs"][kind]["properties"]["target"]
+        tree["$defs"][kind] = {
+            "type": "object",
+            "properties": {"_target_": {**target, "title": "Target"}},
+            "additionalProperties": True,  # what the class or function takes
+        }
     tree["properties"] |= {"defaults": {"type": "array"}, "hydra": {"type": "object"}}
     return tree
 

@@ -17,9 +17,11 @@ from experiments.config.settings import (
     RecordedSettings,
     Region,
     Settings,
+    ShapeList,
     SubjectSettings,
     TaskSettings,
 )
+from mlci.shapes import as_shape, checked_hull
 from mlci.spaces import StateSpace
 
 
@@ -34,8 +36,7 @@ def point_shape_problems(settings: Settings) -> Iterator[str]:
     space = settings.model.space
     yield from _length_problems("safety.shape", settings.safety.shape, space)
     yield from _task_region_problems(settings.tasks, space)
-    for i, region in enumerate(settings.truth.boxes):
-        yield from _region_problems(f"truth.boxes[{i}]", region, space)
+    yield from _listed_problems("truth", settings.truth, space)
     yield from _reality_problems(settings)
 
 
@@ -118,10 +119,22 @@ def _subject_problems(settings: SubjectSettings) -> Iterator[str]:
             f"action_range: {[list(ends) for ends in ranges]} must be {controls} pairs, each of a "
             "lower and a higher value"
         )
-    for i, region in enumerate(settings.hypotheses.boxes):
-        yield from _region_problems(f"hypotheses.boxes[{i}]", region, space)
-    if settings.hypotheses.shape is None and not settings.hypotheses.boxes:
+    yield from _listed_problems("hypotheses", settings.hypotheses, space)
+    if settings.hypotheses.shape is None and not settings.hypotheses.count:
         yield "hypotheses: no shape and no boxes; give a shape, for a grid of cells, or boxes"
+
+
+def _listed_problems(group: str, listed: ShapeList, space: StateSpace) -> Iterator[str]:
+    """Boxes and other regions that cannot be some of the state space."""
+    for i, region in enumerate(listed.boxes):
+        yield from _region_problems(f"{group}.boxes[{i}]", region, space)
+    for key, make in listed.makers():
+        if not key.startswith("boxes"):
+            try:
+                checked_hull(space, as_shape(make()), f"{group}.{key}")
+            except ValueError as error:
+                where = f"{group}.{key}"
+                yield str(error) if str(error).startswith(where) else f"{where}: {error}"
 
 
 def _offset_problems(offset: tuple[float, ...] | None, space: StateSpace) -> Iterator[str]:

@@ -35,17 +35,17 @@ def truth_problems(settings: Settings) -> Iterator[str]:
             f"demonstrations.rule_breaking: {settings.demonstrations.rule_breaking}, but no truth "
             "is there to break; set it to 0"
         )
-    nothing = not truth.boxes and truth.cell is None
+    nothing = not truth.count and truth.cell is None
     if nothing and truth.name != NO_TRUTH:
         yield (
-            "truth.boxes: [] is empty; give at least one box, with lower and upper, or a cell, or "
-            f"choose truth={NO_TRUTH}"
+            "truth.boxes: [] is empty; give at least one box, with lower and upper, or another "
+            f"region, or a cell, or choose truth={NO_TRUTH}"
         )
     if truth.name == NO_TRUTH and not nothing:
         yield f"truth.name: {NO_TRUTH} means that nothing is forbidden; take another name"
-    if truth.cell is not None and truth.boxes:
-        yield f"truth.cell: {truth.cell} and {len(truth.boxes)} boxes are given; keep one of them"
-    if calibration.sets and truth.boxes:
+    if truth.cell is not None and truth.count:
+        yield f"truth.cell: {truth.cell} and {truth.count} regions are given; keep one of them"
+    if calibration.sets and truth.count:
         yield (
             f"calibration.sets: {calibration.sets}, but the prior knows no such truth; take "
             "truth=none or truth=cell, or 0 sets"
@@ -79,7 +79,12 @@ def safe_set_problems(settings: Settings) -> Iterator[str]:
         states = np.random.default_rng(0).uniform(
             space.bounds.lower, space.bounds.upper, (_PROBES, space.dimension)
         )
-        if np.all(settings.constraint.signed_distance(states) <= 0):
+        try:
+            distances = settings.constraint.signed_distance(states)
+        except ValueError as error:
+            yield f"truth.shapes: {error}"
+            return
+        if np.all(distances <= 0):
             yield f"truth.boxes: {settings.truth.name} forbids every state; make its boxes smaller"
             return
         try:
@@ -98,7 +103,13 @@ def safe_set_problems(settings: Settings) -> Iterator[str]:
     elif safety.method == "equation":
         grid = Grid(space, safety.shape)
         for i in range(len(settings.constraint)):
-            if names := " and ".join(_missed(settings.constraint.box(i), grid)):
+            if not settings.constraint.are_boxes[i]:
+                if np.all(settings.constraint.shape(i).level(space, grid.centers) >= 0):
+                    yield (
+                        f"safety.shape: {list(safety.shape)} has no cell centre inside the truth's "
+                        f"region {i}; use more cells"
+                    )
+            elif names := " and ".join(_missed(settings.constraint.box(i), grid)):
                 yield (
                     f"safety.shape: {list(safety.shape)} has no cell centre inside the truth's box "
                     f"{i} along {names}; use more cells"

@@ -19,7 +19,7 @@ import pandas as pd
 import mlci.calibration
 import mlci.demonstrator
 from experiments.config.settings import ModelSettings, RecordedSettings, Settings
-from experiments.point.stages import model_inputs, system_module, tabular_model
+from experiments.point.stages import model_inputs, shape_modules, system_module, tabular_model
 from experiments.point.trials import nominal_skill
 from experiments.progress import begin
 from experiments.tracking.sources import source_hash
@@ -83,7 +83,8 @@ def forecast_calibration(settings: Settings, store: Store) -> Calibration:
 def _modules(settings: ModelSettings) -> list[ModuleType]:
     """The modules that `forecast_calibration` depends on."""
     here = sys.modules[__name__]
-    return [mlci.calibration, mlci.demonstrator, system_module(settings.model), here]
+    modules = [mlci.calibration, mlci.demonstrator, system_module(settings.model), here]
+    return modules + shape_modules(settings, settings.candidates)
 
 
 def exported_calibration(settings: RecordedSettings, exported: Store) -> Calibration | None:

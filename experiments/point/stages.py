@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+import mlci.balls
 import mlci.constant_controls
+import mlci.half_spaces
 import mlci.reachability
 import mlci.tabular
-from experiments.config.settings import ModelSettings, Settings
+from experiments.config.settings import ModelSettings, Settings, ShapeList, SubjectSettings
 from experiments.tracking.store import Store, Stored
 from mlci.constant_controls import tabulate_escapes
 from mlci.grids import Grid
@@ -40,7 +42,7 @@ def safe_set_inputs(settings: Settings) -> tuple[Any, ...]:
     method, horizon = settings.safety.method, settings.horizon
     return (
         settings.real_system,
-        corners(settings.constraint),
+        region_inputs(settings, settings.constraint),
         method,
         settings.safety.shape,
         horizon if method == ESCAPES else None,  # the equation's solution is converged
@@ -60,7 +62,7 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
             safe = solve_safe_set(system, grid, truth)
         return {"values": safe.values, "gradients": safe.gradients}
 
-    modules = [source, system_module(settings.model)]
+    modules = [source, system_module(settings.model), *shape_modules(settings, settings.constraint)]
     stored = store.get("safe_set", safe_set_inputs(settings), modules, compute)
     return SafeSet(grid, stored["values"], stored["gradients"]), stored.key
 
@@ -103,7 +105,7 @@ def model_inputs(settings: ModelSettings, regions: Regions) -> tuple[Any, ...]:
         settings.dt,
         settings.transition.samples,
         settings.temperature,
-        corners(regions),
+        region_inputs(settings, regions),
     )
 
 
@@ -120,6 +122,7 @@ def _discretized(
         return {name: arrays[name] for name in names}
 
     modules = [mlci.tabular, system_module(settings.model), sys.modules[__name__]]
+    modules += shape_modules(settings, regions)
     return store.get(stage, model_inputs(settings, regions), modules, compute)
 
 
@@ -136,10 +139,32 @@ def _discretize(settings: Settings, regions: Regions) -> TabularModel:
     )
 
 
-def corners(regions: Regions) -> list[list[str]]:
-    """The corners of regions, for a key: infinite sides are no JSON."""
+def region_inputs(settings: SubjectSettings, regions: Regions) -> list[Any]:
+    """What decides regions: the corners of boxes, as words, since infinite sides are no JSON.
+
+    A region that is no box may be one of a function, so that its settings decide.
+    """
     sides = np.hstack([regions.lower, regions.upper])
-    return [[repr(float(side)) for side in box] for box in sides]
+    corners: list[Any] = [[repr(float(side)) for side in box] for box in sides]
+    if regions.are_boxes.all():
+        return corners
+    kinds = [None if shape is None else type(shape).__name__ for shape in regions.shapes]
+    return [corners, kinds, [listed.others for listed in _lists(settings, regions)]]
+
+
+def shape_modules(settings: SubjectSettings, regions: Regions) -> list[ModuleType]:
+    """The modules that define regions which are no boxes."""
+    if regions.are_boxes.all():
+        return []
+    lists = _lists(settings, regions)
+    own = {shape.target for listed in lists for shape in listed.shapes}
+    makers = [sys.modules[target.rpartition(".")[0]] for target in sorted(own)]
+    return [mlci.balls, mlci.half_spaces, *makers]
+
+
+def _lists(settings: SubjectSettings, regions: Regions) -> tuple[ShapeList, ...]:
+    """What lists regions: hypotheses do not depend on the truth, which may be one of them."""
+    return (settings.hypotheses,) if regions is settings.candidates else settings.shape_lists
 
 
 def system_module(system: System) -> ModuleType:

@@ -18,7 +18,7 @@ import mlci.effort
 import mlci.safety_filter
 from experiments.config.settings import Settings
 from experiments.point.no_answer import NoAnswer
-from experiments.point.stages import corners, safe_set, system_module
+from experiments.point.stages import region_inputs, safe_set, shape_modules, system_module
 from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
 from mlci.demonstrations import Demonstration, Task, even_times
@@ -88,7 +88,7 @@ def demonstration_inputs(settings: Settings, safe_set_key: str | None) -> tuple[
         safe_set_key,
         settings.real_system,
         settings.reality,
-        corners(settings.constraint),
+        region_inputs(settings, settings.constraint),
         # How many survivors make the study is decided later, and must not make them anew.
         replace(demonstrator, keep=demonstrator.pairs),
         settings.tasks,
@@ -137,6 +137,7 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
         mlci.safety_filter,
         system_module(settings.model),
         sys.modules[__name__],
+        *shape_modules(settings, settings.constraint),
     ]
     inputs = demonstration_inputs(settings, omega_key)
     return TrialSet(**store.get("demonstrations", inputs, modules, compute))

@@ -11,7 +11,6 @@ from experiments.config.settings.parts import (
     InferenceSettings,
     NextTaskSettings,
     RankSettings,
-    Region,
     SafetySettings,
     TaskSettings,
     TransitionSettings,
@@ -20,6 +19,13 @@ from experiments.config.settings.parts import (
 from experiments.config.settings.point import ModelSettings, Settings, SubjectSettings
 from experiments.config.settings.reality import RealitySettings
 from experiments.config.settings.recorded import RecordedSettings
+from experiments.config.settings.shapes import (
+    BallSettings,
+    HalfSpaceSettings,
+    Region,
+    ShapeList,
+    ShapeSettings,
+)
 from experiments.config.settings.study import RunSettings, StudySettings, SweepSettings
 from experiments.config.settings.system import SystemSettings, system_class
 
@@ -27,9 +33,11 @@ __all__ = [
     "ESTIMATE",
     "NO_TRUTH",
     "AdviceSettings",
+    "BallSettings",
     "CalibrationSettings",
     "DemonstrationSettings",
     "GridSettings",
+    "HalfSpaceSettings",
     "HypothesesSettings",
     "InferenceSettings",
     "ModelSettings",
@@ -41,6 +49,8 @@ __all__ = [
     "RunSettings",
     "SafetySettings",
     "Settings",
+    "ShapeList",
+    "ShapeSettings",
     "StudySettings",
     "SubjectSettings",
     "SweepSettings",

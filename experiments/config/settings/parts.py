@@ -23,6 +23,7 @@ from experiments.config.settings.kinds import (
     Word,
     about,
 )
+from experiments.config.settings.shapes import Region, ShapeList
 from mlci.evidence import Rates
 from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
@@ -30,24 +31,6 @@ from mlci.spaces import Box, StateSpace
 NO_TRUTH = "none"  # the truth's name where nothing is forbidden
 
 Shape = Annotated[tuple[Count, ...], Field(min_length=1)]
-
-
-@dataclass(frozen=True, config=STRICT)
-class Region:
-    """A box of states; None leaves that dimension free, at both ends."""
-
-    lower: Annotated[
-        tuple[Number | None, ...],
-        about("lower ends, one a dimension; null leaves a dimension free", "of the state"),
-    ]
-    upper: Annotated[tuple[Number | None, ...], about("upper ends", "of the state")]
-
-    def box(self) -> Box:
-        """The region with infinite sides where a dimension is free."""
-        return Box(
-            np.array([-np.inf if side is None else side for side in self.lower]),
-            np.array([np.inf if side is None else side for side in self.upper]),
-        )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -93,14 +76,10 @@ class TaskSettings(Region):
 
 
 @dataclass(frozen=True, config=STRICT)
-class TruthSettings:
-    """The true constraint: the union of its boxes, one of the hypotheses, or nothing at all."""
+class TruthSettings(ShapeList):
+    """The true constraint: the union of what is listed, a hypothesis, or nothing at all."""
 
     name: Annotated[Word, about(f"what tables call it; `{NO_TRUTH}` where nothing is forbidden")]
-    boxes: Annotated[
-        tuple[Region, ...],
-        about("boxes whose union is forbidden, null for a free dimension", "of the state"),
-    ]
     cell: Annotated[Index | None, about("or one of the hypotheses, by its number")]
 
     @property
@@ -133,8 +112,8 @@ class TransitionSettings:
 
 
 @dataclass(frozen=True, config=STRICT)
-class HypothesesSettings:
-    """Cells of a regular grid (None leaves a dimension free), then listed boxes."""
+class HypothesesSettings(ShapeList):
+    """Cells of a regular grid (None leaves a dimension free), then listed regions."""
 
     shape: Annotated[
         Annotated[tuple[Count | None, ...], Field(min_length=1)] | None,
@@ -143,18 +122,13 @@ class HypothesesSettings:
             "is none"
         ),
     ]
-    boxes: Annotated[
-        tuple[Region, ...],
-        about("more hypotheses, null for a free dimension", "of the state"),
-    ]
 
     def regions(self, space: StateSpace) -> Regions:
         """All hypotheses, in the order in which tables number them."""
-        boxes = [region.box() for region in self.boxes]
+        listed = Regions.from_shapes(space, self.listed())
         if self.shape is None:
-            return Regions.from_boxes(space, boxes)
-        cells = Regions.from_grid(space, self.shape)
-        return cells.joined(Regions.from_boxes(space, boxes))
+            return listed
+        return Regions.from_grid(space, self.shape).joined(listed)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -35,6 +35,7 @@ from experiments.config.settings.parts import (
     TruthSettings,
 )
 from experiments.config.settings.reality import RealitySettings, read_reality
+from experiments.config.settings.shapes import ShapeList
 from experiments.config.settings.system import SystemSettings, read_system
 from mlci.effort import WithEffort
 from mlci.grids import Grid
@@ -75,6 +76,11 @@ class SubjectSettings:
     def candidates(self) -> Regions:
         """The hypotheses."""
         return self.hypotheses.regions(self.model.space)
+
+    @property
+    def shape_lists(self) -> tuple[ShapeList, ...]:
+        """What lists regions."""
+        return (self.hypotheses,)
 
     @property
     def action_values(self) -> Floats:
@@ -142,11 +148,16 @@ class Settings(ModelSettings):
     @cached_property
     def constraint(self) -> Regions:
         """The true constraint; a set of no regions where there is none."""
-        boxes = [region.box() for region in self.truth.boxes]
+        shapes = self.truth.listed()
         if self.truth.cell is not None:
-            boxes = [self.candidates.box(self.truth.cell)]
-        names = [f"truth_{number}" for number in range(len(boxes))]
-        return Regions.from_boxes(self.model.space, boxes, names)
+            shapes = [self.candidates.shape(self.truth.cell)]
+        names = [f"truth_{number}" for number in range(len(shapes))]
+        return Regions.from_shapes(self.model.space, shapes, names)
+
+    @property
+    def shape_lists(self) -> tuple[ShapeList, ...]:
+        """See `SubjectSettings.shape_lists`."""
+        return self.hypotheses, self.truth
 
     @property
     def real_system(self) -> SystemSettings:

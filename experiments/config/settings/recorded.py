@@ -20,8 +20,8 @@ from experiments.config.settings.kinds import (
     about,
     one_or_list,
 )
-from experiments.config.settings.parts import Region
 from experiments.config.settings.point import ModelSettings
+from experiments.config.settings.shapes import Region
 from experiments.config.settings.study import RESULTS
 from mlci.crossings import Crossing
 

@@ -14,7 +14,7 @@ from tiny_point import composed, planned
 
 from experiments.config.paths import CONF
 from experiments.config.read import ConfigError, plain_tree, read_config
-from experiments.config.settings import Region
+from experiments.config.settings import BallSettings, HalfSpaceSettings, Region, ShapeSettings
 
 
 def options(group: str) -> list[str]:
@@ -116,8 +116,14 @@ def test_every_setting_changes_identity() -> None:
     words = ["safety.margin=0.1", "truth=cell", "truth.cell=5", "action_range=[[-3,3]]"]
     settings, _ = read_config(composed(*words, *of_reality))
     boxes = (Region((0.0, None), (1.0, None)),)
-    truth = dataclasses.replace(settings.truth, boxes=boxes)
-    hypotheses = dataclasses.replace(settings.hypotheses, boxes=boxes)
+    kinds = {
+        "boxes": boxes,
+        "balls": (BallSettings((0.5, None), (1.0, None)),),
+        "half_spaces": (HalfSpaceSettings((0.0, 1.0), 5.0),),
+        "shapes": (ShapeSettings("own.ring", {"width": 1.0}),),
+    }
+    truth = dataclasses.replace(settings.truth, **kinds)
+    hypotheses = dataclasses.replace(settings.hypotheses, **kinds)
     settings = dataclasses.replace(settings, truth=truth, hypotheses=hypotheses)
     others = list(changed(settings))
     assert len(others) > 30
@@ -144,7 +150,7 @@ COMMANDS = [
         "grid.shape=[5,6,7]",
         "grid.shape: [5, 6, 7] must have 2 entries, one each for angle",
     ),
-    ("truth.cell=37", "truth.cell: 37 and 1 boxes are given; keep one of them"),
+    ("truth.cell=37", "truth.cell: 37 and 1 regions are given; keep one of them"),
     ("sweep.time_limit=5", "sweep.time_limit: only a sweep heeds it; add -m, or leave it out"),
     ("sweep.retries=1", "sweep.retries: only a sweep heeds it"),
     ("hydra.run.dirr=x", "hydra.run.dirr: unknown key; did you mean dir?"),
@@ -242,6 +248,29 @@ VALUES = [
     ("truth.boxes=3", "truth.boxes: 3 is not a list"),
     ("truth.boxes=[3]", "truth.boxes[0]: 3 is not a region; write its ends"),
     ("truth.boxes=[{lower:[0,1]}]", "truth.boxes[0].upper: missing; give it a value"),
+    ("truth.balls=[3]", "truth.balls[0]: 3 is not a ball; write its centre and semi-axes"),
+    ("truth.balls=[{center:[0],radii:[1]}]", "truth.balls[0]: a ball needs a centre of 2"),
+    ("truth.balls=[{center:[0,1],radii:[1,0]}]", "truth.balls[0].radii[1]: 0.0 must be above 0"),
+    ("truth.balls=[{center:[0,1],radii:[null,null]}]", "truth.balls[0]: a ball needs positive"),
+    ("truth.balls=[{center:[0,1],radius:1}]", "truth.balls[0].radius: unknown key"),
+    ("truth.half_spaces=[1]", "truth.half_spaces[0]: 1 is not a half-space; write {normal"),
+    ("truth.half_spaces=[{normal:[1,0],offset:1}]", "truth.half_spaces[0]: angle wraps"),
+    ("truth.half_spaces=[{normal:[0,1],offset:7}]", "truth.half_spaces[0] holds nothing of"),
+    ("hypotheses.half_spaces=[{normal:[0],offset:1}]", "hypotheses.half_spaces[0]: a half-space"),
+    ("truth.shapes=[{}]", "truth.shapes[0]._target_: missing; name a function that returns a"),
+    ("truth.shapes=[{_target_:no.such}]", "truth.shapes[0]._target_: 'no.such' cannot be imported"),
+    ("truth.shapes=[{_target_:math.pi}]", "truth.shapes[0]._target_: 'math.pi' is no function"),
+    ("truth.shapes=[{_target_:math.tau}]", "'math.tau' is no function"),
+    ("truth.shapes=[{_target_:fractions.Fraction}]", "fractions.Fraction must return a region"),
+    ("truth.shapes=[{_target_:mlci.balls.Ball}]", "truth.shapes[0].center: missing; give it"),
+    (
+        "truth.shapes=[{_target_:mlci.balls.Ball,center:[0],radii:[0]}]",
+        "truth.shapes[0]: mlci.balls.Ball fails: ValueError: a ball needs positive radii",
+    ),
+    (
+        "truth.shapes=[{_target_:mlci.balls.Ball,center:[0],radii:1}]",
+        "truth.shapes[0]: a ball needs a centre of 2 dimensions",
+    ),
     ("truth.name=3", "truth.name: 3 is not a word"),
     ("actions=[3.5]", "actions[0]: 3.5 is not a whole number"),
     ("actions=[]", "actions: [] is empty; give at least one"),

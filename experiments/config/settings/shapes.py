@@ -1,0 +1,163 @@
+"""Regions of a config: boxes, balls, half-spaces, and shapes of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator
+from pydantic.dataclasses import dataclass
+
+from experiments.config.settings.kinds import STRICT, Number, Positive, Word, about
+from experiments.config.settings.targets import (
+    arguments_of,
+    named,
+    problem,
+    target_error,
+    target_of,
+)
+from mlci.balls import Ball
+from mlci.half_spaces import HalfSpace
+from mlci.shapes import Shape
+from mlci.spaces import Box
+
+
+@dataclass(frozen=True, config=STRICT)
+class Region:
+    """A box of states; None leaves that dimension free, at both ends."""
+
+    lower: Annotated[
+        tuple[Number | None, ...],
+        about("lower ends, one a dimension; null leaves a dimension free", "of the state"),
+    ]
+    upper: Annotated[tuple[Number | None, ...], about("upper ends", "of the state")]
+
+    def box(self) -> Box:
+        """The region with infinite sides where a dimension is free."""
+        return Box(
+            np.array([-np.inf if side is None else side for side in self.lower]),
+            np.array([np.inf if side is None else side for side in self.upper]),
+        )
+
+
+@dataclass(frozen=True, config=STRICT)
+class BallSettings:
+    """A ball, or an ellipsoid along the axes; a radius of None leaves that dimension free."""
+
+    center: Annotated[
+        tuple[Number | None, ...],
+        about("centre, one a dimension; null where the dimension is free", "of the state"),
+    ]
+    radii: Annotated[tuple[Positive | None, ...], about("semi-axes", "of the state")]
+
+    def ball(self) -> Ball:
+        """The ball with infinite radii where a dimension is free."""
+        return Ball(
+            [0.0 if middle is None else middle for middle in self.center],
+            [np.inf if radius is None else radius for radius in self.radii],
+        )
+
+
+@dataclass(frozen=True, config=STRICT)
+class HalfSpaceSettings:
+    """States with normal . x > offset."""
+
+    normal: Annotated[
+        tuple[Number, ...], about("one a dimension, 0 where it does not count; points into it")
+    ]
+    offset: Annotated[Number, about("normal . x is greater inside", "of normal . x")]
+
+    def half_space(self) -> HalfSpace:
+        """The half-space."""
+        return HalfSpace(self.normal, self.offset)
+
+
+@dataclass(frozen=True, config=STRICT)
+class ShapeSettings:
+    """A shape of one's own: what a function or class makes of its arguments."""
+
+    target: Annotated[Word, about("dotted name of what returns a mlci.shapes.Shape")]
+    arguments: Annotated[Mapping[str, Any], about("what it takes")]
+
+    def shape(self) -> Shape:
+        """The shape itself."""
+        made: Shape = named(self.target)(**self.arguments)
+        return made
+
+
+def read_shape(tree: Any) -> ShapeSettings:
+    """A shape from `_target_` and the arguments beside it.
+
+    Raises:
+        ValidationError: an argument that it does not take, lacks, or takes otherwise.
+        PydanticCustomError: nothing that makes a shape.
+    """
+    if isinstance(tree, ShapeSettings):
+        return tree
+    target = target_of(tree, "a function that returns a region, such as your_module.ring")
+    try:
+        maker = named(target)
+    except ValueError as error:
+        raise target_error(target, str(error)) from None
+    if not callable(maker):
+        raise target_error(target, f"{target!r} is no function")
+    settings = ShapeSettings(target, arguments_of(maker, target, tree))
+    try:
+        shape = settings.shape()
+    except Exception as error:  # it may be anybody's function
+        raise problem(f"{target} fails: {type(error).__name__}: {error}") from None
+    if not isinstance(shape, Shape):
+        raise problem(
+            f"{target} must return a region of mlci, such as a Ball, a Predicate or a union of "
+            f"them, not {type(shape).__name__}"
+        )
+    return settings
+
+
+@dataclass(frozen=True, config=STRICT)
+class ShapeList:
+    """Regions of several kinds."""
+
+    boxes: Annotated[
+        tuple[Region, ...],
+        about("regions that are boxes, null for a free dimension", "of the state"),
+    ]
+    balls: Annotated[
+        tuple[BallSettings, ...],
+        about("regions that are balls or ellipsoids, a null radius for a free dimension"),
+    ]
+    half_spaces: Annotated[tuple[HalfSpaceSettings, ...], about("regions with normal . x > offset")]
+    shapes: Annotated[
+        tuple[Annotated[ShapeSettings, BeforeValidator(read_shape)], ...],
+        about(
+            "regions of your own: `_target_` names a function that returns one and takes the other "
+            "keys"
+        ),
+    ]
+
+    @property
+    def count(self) -> int:
+        """How many are listed."""
+        return sum(len(kind) for kind in (self.boxes, *self.others))
+
+    @property
+    def others(self) -> tuple[tuple[Any, ...], ...]:
+        """The regions that are no boxes, by kind."""
+        return self.balls, self.half_spaces, self.shapes
+
+    def makers(self) -> Iterator[tuple[str, Callable[[], Shape | Box]]]:
+        """The key of each, such as `balls[0]`, and what makes it."""
+        makers: dict[str, list[Callable[[], Shape | Box]]] = {
+            "boxes": [region.box for region in self.boxes],
+            "balls": [ball.ball for ball in self.balls],
+            "half_spaces": [half.half_space for half in self.half_spaces],
+            "shapes": [own.shape for own in self.shapes],
+        }
+        for kind, of_kind in makers.items():
+            for number, make in enumerate(of_kind):
+                yield f"{kind}[{number}]", make
+
+    def listed(self) -> list[Shape | Box]:
+        """All of them, in the order in which tables number them."""
+        return [make() for _, make in self.makers()]
