@@ -154,6 +154,7 @@ def _answer(
         model,
         demonstrations,
         prior_none=settings.inference.prior,
+        size_prior=settings.inference.size_prior,
         rates=settings.inference.rates(calibrated=forecast_map is not None),
         calibration=forecast_map,
         exact_ends=exact_ends,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,11 @@ from mlci.demonstrations import Demonstration
 from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
+from mlci.membership import volume_share
 from mlci.misfit import SAMPLES, Misfit, misfit
 from mlci.regions import Regions
+from mlci.shapes import Cuboid
+from mlci.size_bias import SizeBias, size_bias
 from mlci.soft_weight import WeightEstimate
 from mlci.spaces import Bools, Ints
 from mlci.support import Support, support
@@ -53,6 +57,11 @@ class Answer:
     temperature_estimate: TemperatureEstimate | None = None
     doubts: tuple[str, ...] = ()
     weights: tuple[WeightEstimate, ...] = ()
+
+    @cached_property
+    def size_bias(self) -> SizeBias | None:
+        """How gains go with the sizes of regions; None where all are of one size."""
+        return size_bias(self.inference)
 
     @property
     def assumptions(self) -> list[str]:
@@ -120,6 +129,7 @@ class Answer:
             if self.temperature_estimate is None
             else self.temperature_estimate.record(),
             "weights": [estimate.record() for estimate in self.weights],
+            "size_bias": None if self.size_bias is None else self.size_bias.record(),
             "unseen": [names[i] for i in self.unseen],
             "warnings": self.warnings,
         }
@@ -143,6 +153,8 @@ class Answer:
                 f"none of the tasks could have shown {len(self.unseen)} of {len(self.cut)} "
                 "regions, which hardly any path enters: that they are avoided says nothing"
             )
+        if self.size_bias is not None:
+            phrases += self.size_bias.warnings
         if np.any(self.cut):
             space = self.inference.hypotheses.space
             sides = " and ".join(
@@ -219,7 +231,10 @@ def unseen(inference: Inference) -> Ints:
 
 
 def cut_by(grid: Grid, regions: Regions) -> Bools:
-    """(C, n) whether a region has a side, within the bounds, that is no border of cells."""
+    """(C, n) whether a region has a side, within the bounds, that is no border of cells.
+
+    The border of a shape that is not its own hull counts in each dimension that it depends on.
+    """
     cut = np.zeros((len(regions), regions.space.dimension), dtype=bool)
     origin, bounds = grid.corners[0][0], regions.space.bounds
     for side in (regions.lower, regions.upper):
@@ -228,6 +243,13 @@ def cut_by(grid: Grid, regions: Regions) -> Bools:
         )
         cells = np.where(inside, (side - origin) / grid.widths, 0.0)
         cut |= np.abs(cells - np.round(cells)) > _SAME_SIDE
+    for i in np.flatnonzero(~regions.are_boxes).tolist():
+        size, of_hull = (
+            volume_share(regions.space, shape)
+            for shape in (regions.shape(i), Cuboid(regions.box(i)))
+        )
+        if size < of_hull * (1 - _SAME_SIDE):  # a side that is not along the axes
+            cut[i] = np.isfinite(regions.lower[i])
     return cut
 
 

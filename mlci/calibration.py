@@ -20,8 +20,9 @@ from mlci.crossings import ANY, Crossing, crossed
 from mlci.demonstrations import REACHED, Demonstration, Task
 from mlci.demonstrator import Outcome, Trial, demonstrate, first_guesses
 from mlci.forecast_scores import ForecastScores, score_forecasts
-from mlci.forecasts import ForecastMap, fit_map, is_possible, region_sizes
+from mlci.forecasts import ForecastMap, fit_map, is_possible
 from mlci.preparation import prepare
+from mlci.region_sizes import region_sizes
 from mlci.regions import Regions, as_mask
 from mlci.simulate import RK4
 from mlci.spaces import Bools, Box, Floats, StateSpace

@@ -168,14 +168,19 @@ def rank_constraints(
         avoidance: (N, C) as of `log_evidence`.
         violated: (N, C) which hypotheses each demonstration violates.
         prior_none: prior probability that there is no constraint.
-        prior: (C,) prior weights of the hypotheses; equal by default.
+        prior: (C,) prior weights of the hypotheses, which then count for their rank; equal by
+            default.
         rates: model error and rule breaking.
 
     Raises:
         ValueError: shapes that disagree, probabilities outside [0, 1].
     """
     gain = total_gain(log_evidence(avoidance, violated, rates))
-    rank = rank_scores(gain, gain > -np.inf)
+    score = gain
+    if prior is not None:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            score = gain + np.log(prior_shares(gain.shape[-1], prior_none, prior))
+    rank = rank_scores(score, gain > -np.inf)
     each, none = posterior(gain, prior_none, prior)
     feasible = ~np.any(np.asarray(violated, dtype=bool), axis=0)
     return Ranking(gain, feasible, rank, np.argsort(rank, kind="stable"), each, float(none))

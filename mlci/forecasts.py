@@ -31,7 +31,6 @@ import numpy as np
 import scipy  # loads scipy.optimize and scipy.special when they are first used
 from numpy.typing import ArrayLike
 
-from mlci.regions import Regions
 from mlci.spaces import Bools, Floats, Ints
 
 # Sums of probabilities over moves and steps are rounded by less; what is below is out of reach.
@@ -112,20 +111,12 @@ class ForecastMap:
 
         Args:
             avoidance: (N, C) alpha.
-            sizes: (C,) sizes of the regions, see `region_sizes`.
+            sizes: (C,) sizes of the regions, see `mlci.region_sizes`.
         """
         alpha, numbers = np.array(avoidance, dtype=float), self.curve_numbers(sizes)
         for number, curve in enumerate(self.curves):
             alpha[:, numbers == number] = curve.avoidance(alpha[:, numbers == number])
         return alpha
-
-
-def region_sizes(regions: Regions) -> Floats:
-    """Size (C,) of each region: the share of the state space's volume that it holds."""
-    bounds, periodic = regions.space.bounds, regions.space.periodic
-    lower = np.where(periodic, regions.lower, np.maximum(regions.lower, bounds.lower))
-    upper = np.where(periodic, regions.upper, np.minimum(regions.upper, bounds.upper))
-    return np.prod(np.clip((upper - lower) / bounds.widths, 0.0, 1.0), axis=1)
 
 
 def is_possible(avoidance: ArrayLike) -> Bools:

@@ -16,7 +16,8 @@ from mlci.credible_sets import CredibleSet, credible_set
 from mlci.crossings import ANY, Crossing
 from mlci.demonstrations import Demonstration
 from mlci.evidence import PAPER, Ranking, Rates, log_evidence, rank_constraints
-from mlci.forecasts import ForecastMap, is_possible, region_sizes
+from mlci.forecasts import ForecastMap, is_possible
+from mlci.region_sizes import region_sizes, weights_by_size
 from mlci.regions import Regions
 from mlci.rule_breaking import RateEstimate, estimate_rule_breaking
 from mlci.sampling_errors import SamplingErrors
@@ -53,6 +54,7 @@ class Inference:
             `mlci.evidence.decided_by_cell`.
         crossing: what counted as violating a hypothesis.
         sampling: how far `avoidance` may be off; None where nothing is sampled.
+        size_prior: prior weights are sizes to the power of minus this, see `mlci.region_sizes`.
 
     Raises:
         ValueError: shapes that disagree.
@@ -70,6 +72,7 @@ class Inference:
     decided_by_cell: Bools = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     crossing: Crossing = ANY
     sampling: SamplingErrors | None = None
+    size_prior: float = 0.0
 
     def __post_init__(self) -> None:
         shape = len(self.names), len(self.hypotheses)
@@ -86,7 +89,8 @@ class Inference:
     @cached_property
     def ranking(self) -> Ranking:
         """Gain, rank and posterior of each hypothesis, equations (4) to (6)."""
-        return rank_constraints(self.forecast, self.violated, self.prior_none, rates=self.rates)
+        weights = weights_by_size(self.hypotheses, self.size_prior)
+        return rank_constraints(self.forecast, self.violated, self.prior_none, weights, self.rates)
 
     @property
     def phi(self) -> Floats:

@@ -21,7 +21,7 @@ def points_of(space: StateSpace, shape: Shape) -> Floats:
     box = _hull_within(space, shape)
     if not np.all(box.widths > 0):
         return np.empty((0, space.dimension))
-    points = _spread(box)
+    points = spread_points(box)
     if isinstance(shape, Cuboid):
         return np.concatenate([points, box.vertices()])
     return points[shape.level(space, points) < 0]
@@ -32,7 +32,7 @@ def volume_share(space: StateSpace, shape: Shape) -> float:
     box = _hull_within(space, shape)
     if not np.all(box.widths > 0):
         return 0.0
-    inside = np.mean(shape.level(space, _spread(box)) < 0)
+    inside = np.mean(shape.level(space, spread_points(box)) < 0)
     return float(inside * np.prod(box.widths / space.bounds.widths))
 
 
@@ -70,10 +70,10 @@ def _hull_within(space: StateSpace, shape: Shape) -> Box:
     return Box(np.minimum(lower, upper), upper)
 
 
-def _spread(box: Box) -> Floats:
-    """Points (P, n) spread evenly over a box."""
+def spread_points(box: Box, count: int = _POINTS) -> Floats:
+    """Points (count, n) spread evenly over a finite box."""
     ratio = 2.0
     for _ in range(60):  # the positive root of x^(n + 1) = x + 1
         ratio = (1 + ratio) ** (1 / (box.dimension + 1))
-    shares = (0.5 + np.outer(np.arange(_POINTS), ratio ** -np.arange(1.0, box.dimension + 1))) % 1
+    shares = (0.5 + np.outer(np.arange(count), ratio ** -np.arange(1.0, box.dimension + 1))) % 1
     return box.lower + shares * box.widths

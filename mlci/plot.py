@@ -13,10 +13,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import PathPatch, Rectangle
+from matplotlib.path import Path
 
 from mlci.demonstrations import Demonstration
 from mlci.inference import Inference
+from mlci.outlines import outline
 from mlci.planes import Plane, planes
 
 TOP = 5  # regions whose rank is written on the map
@@ -51,16 +53,22 @@ def draw_map(
     # Gains spread over decades: the square root keeps the small ones apart from none.
     scale = PowerNorm(0.5, 0.0, max(float(finite.max(initial=0.0)), _NEARLY_NONE))
     colours = ScalarMappable(scale, _COLOURS)
-    shapes, faces = [], []
+    shapes: list[Any] = []
+    faces: list[Any] = []
     for i in np.argsort(-rank, kind="stable"):
         colour: Any = colours.to_rgba(np.clip(gain[i], 0.0, scale.vmax))
         if gain[i] == -np.inf:
             colour = _RULED_OUT
         elif gain[i] == np.inf:
             colour = _UNAVOIDABLE
-        boxes = plane.rectangles(regions.box(int(i)))
-        shapes += [Rectangle((a, low), b - a, high - low) for a, b, low, high in boxes]
-        faces += [colour] * len(boxes)
+        shape, boxes = regions.shapes[i], plane.rectangles(regions.box(int(i)))
+        if shape is None:
+            shapes += [Rectangle((a, low), b - a, high - low) for a, b, low, high in boxes]
+            faces += [colour] * len(boxes)
+        elif rings := outline(plane, shape):
+            closed = [Path(ring, closed=True) for ring in rings]
+            shapes.append(PathPatch(Path.make_compound_path(*closed)))
+            faces.append(colour)
         if boxes and rank[i] <= TOP and gain[i] > 0:
             _number(axes, boxes[0], float(rank[i]))
     # One collection, as drawing takes a time for each artist.

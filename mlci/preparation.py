@@ -79,6 +79,7 @@ class PreparedInference:
         calibration: ForecastMap | None = None,
         tolerance: float = REACHED,
         crossing: Crossing = ANY,
+        size_prior: float = 0.0,
     ) -> Inference:
         """Rank the hypotheses by the demonstrations that have arrived, equations (4) to (6).
 
@@ -95,6 +96,7 @@ class PreparedInference:
             tolerance: how far a path may start from its task's start and end from its goal,
                 Euclidean in raw units.
             crossing: what counts as entering a hypothesis; a touch by default.
+            size_prior: as of `infer`.
 
         Raises:
             ValueError: a task that is not known, not one task and name for each path, or a path
@@ -129,6 +131,7 @@ class PreparedInference:
             decided_by_cell=self.decided_by_cell[numbers],
             crossing=crossing,
             sampling=self.sampling and self.sampling.of(numbers),
+            size_prior=size_prior,
         )
 
     def _path(self, path: ArrayLike, dt: float, number: int, name: str, tolerance: float) -> Floats:
@@ -159,6 +162,7 @@ def infer(
     exact_ends: bool = True,
     tolerance: float = REACHED,
     crossing: Crossing = ANY,
+    size_prior: float = 0.0,
     n_jobs: int = 1,
     progress: Progress | None = None,
 ) -> Inference:
@@ -178,6 +182,7 @@ def infer(
             entered only because it holds a cell's centre. The paper's begin and end at cells.
         tolerance: how far a demonstration may end from its task's goal, Euclidean in raw units.
         crossing: what counts as entering a hypothesis; a touch by default.
+        size_prior: prior weights are sizes to the power of minus this, see `mlci.region_sizes`.
         n_jobs: tasks that are worked on at once; -1 is one a core. The result is the same.
         progress: called with how many tasks are done, and of how many.
 
@@ -207,6 +212,7 @@ def infer(
         calibration=calibration,
         tolerance=tolerance,
         crossing=crossing,
+        size_prior=size_prior,
     )
 
 

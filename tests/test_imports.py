@@ -48,6 +48,7 @@ MLCI = {
     "mlci.demonstrator": "mlci.demonstrations mlci.ilqr mlci.safety_filter mlci.simulate",
     "mlci.recordings": "mlci.crossings mlci.demonstrations mlci.systems",
     "mlci.planes": "mlci.regions",
+    "mlci.outlines": "mlci.planes",
     "mlci.single_moves": "mlci.spaces",
     "mlci.merged_moves": "mlci.compiled mlci.single_moves",
     "mlci.paths": "mlci.regions mlci.systems",
@@ -74,14 +75,15 @@ MLCI = {
     "mlci.displacements": "mlci.tabular",
     "mlci.exploration": "mlci.displacements mlci.maxent",
     "mlci.evidence": "mlci.spaces",
-    "mlci.forecasts": "mlci.regions",
+    "mlci.region_sizes": "mlci.regions",
+    "mlci.forecasts": "mlci.region_sizes",
     "mlci.forecast_scores": "mlci.forecasts",
     "mlci.likelihood_interval": "mlci.spaces",
     "mlci.rule_breaking": "mlci.evidence mlci.likelihood_interval",
     "mlci.sampling_errors": "mlci.spaces",
     "mlci.inference": "mlci.crossings mlci.forecasts mlci.rule_breaking mlci.credible_sets "
     "mlci.demonstrations mlci.sampling_errors",
-    "mlci.plot": "mlci.inference mlci.planes",
+    "mlci.plot": "mlci.inference mlci.outlines",
     "mlci.passage": "mlci.simulate",
     "mlci.modes": "mlci.demonstrator mlci.passage",
     "mlci.local_policies": "mlci.modes",
@@ -99,15 +101,16 @@ MLCI = {
     "mlci.soft": "mlci.maxent mlci.time_inside",
     "mlci.soft_weight": "mlci.inference mlci.soft",
     "mlci.credible_sets": "mlci.evidence mlci.regions",
+    "mlci.size_bias": "mlci.inference",
     "mlci.support": "mlci.inference",
     "mlci.misfit": "mlci.maxent",
-    "mlci.answers": "mlci.misfit mlci.soft_weight mlci.support mlci.temperature",
+    "mlci.answers": "mlci.misfit mlci.size_bias mlci.soft_weight mlci.support mlci.temperature",
     "mlci.metrics": "mlci.evidence",
     "mlci.task_outcomes": "mlci.evidence",
     "mlci.next_task": "mlci.inference mlci.misfit mlci.models mlci.task_outcomes",
 }
 # What mlci may import of others: no configs, no formats but those of recordings, no figures.
-MATHEMATICS = "numpy scipy numba pandas pyarrow joblib pint openpyxl ezc3d"
+MATHEMATICS = "contourpy numpy scipy numba pandas pyarrow joblib pint openpyxl ezc3d"
 
 # A room of the framework, and all that it may import of this project.
 TRACKING, POINT = (

@@ -50,6 +50,11 @@ def truth_problems(settings: Settings) -> Iterator[str]:
             f"calibration.sets: {calibration.sets}, but the prior knows no such truth; take "
             "truth=none or truth=cell, or 0 sets"
         )
+    if calibration.sets and settings.inference.size_prior:
+        yield (
+            f"calibration.sets: {calibration.sets}, but truths are drawn as equally probable, not "
+            f"by inference.size_prior={settings.inference.size_prior:g}; set that to 0, or 0 sets"
+        )
     for i, region in enumerate(truth.boxes):
         if all(side is None for side in region.lower):
             yield f"truth.boxes[{i}]: forbids every state; give ends to at least one dimension"

@@ -10,6 +10,7 @@ import numpy as np
 
 from experiments.page.words import dimension_title
 from mlci.demonstrations import Demonstration
+from mlci.outlines import outline
 from mlci.planes import Plane, Rectangle, simplified
 from mlci.regions import Regions
 from mlci.spaces import Floats
@@ -36,6 +37,21 @@ class Frame:
         x = _LEFT + (points[:, 0] - x0) / (x1 - x0) * (WIDTH - _LEFT - _RIGHT)
         y = HEIGHT - _BOTTOM - (points[:, 1] - y0) / (y1 - y0) * (HEIGHT - _TOP - _BOTTOM)
         return np.column_stack([x, y])
+
+    def region(self, regions: Regions, number: int) -> tuple[str, float, float] | None:
+        """A region as the data of one SVG path, and its middle; None if there is nothing of it."""
+        rectangles = self.plane.rectangles(regions.box(number))
+        shape = regions.shapes[number]
+        if not rectangles or shape is None:
+            return (self.outline(rectangles), *self.middle(rectangles)) if rectangles else None
+        rings = [
+            np.round(simplified(self.place(ring), _TOLERANCE), 1)
+            for ring in outline(self.plane, shape)
+        ]
+        if not rings:
+            return None
+        lines = ("M" + "L".join(f"{x:g} {y:g}" for x, y in ring) + "Z" for ring in rings)
+        return ("".join(lines), *self.middle(rectangles))
 
     def outline(self, rectangles: Sequence[Rectangle]) -> str:
         """Rectangles as the data of one SVG path."""
@@ -123,12 +139,12 @@ def plane_title(plane: Plane) -> str:
     return " and ".join(names)
 
 
-def places(regions: Regions, plane: Plane) -> dict[tuple[Rectangle, ...], list[int]]:
-    """Regions by where they lie in the plane: those of further dimensions lie on one another."""
-    found: dict[tuple[Rectangle, ...], list[int]] = {}
+def places(frame: Frame, regions: Regions) -> dict[tuple[str, float, float], list[int]]:
+    """Regions by what is drawn of them, and its middle: those of further dimensions may be one."""
+    found: dict[tuple[str, float, float], list[int]] = {}
     for number in range(len(regions)):
-        if rectangles := plane.rectangles(regions.box(number)):
-            found.setdefault(rectangles, []).append(number)
+        if drawn := frame.region(regions, number):
+            found.setdefault(drawn, []).append(number)
     return found
 
 
@@ -149,13 +165,12 @@ def map_svg(
         truth: what is forbidden, as far as it is known.
     """
     frame, shapes, paths = Frame(plane), [], []
-    for rectangles, numbers in places(regions, plane).items():
-        x, y = frame.middle(rectangles)
+    for (line, x, y), numbers in places(frame, regions).items():
         listed = " ".join(map(str, numbers))
         shapes.append(
             f'<g class="place" role="button" tabindex="-1" data-regions="{listed}" '
             f'data-x="{x:.1f}" data-y="{y:.1f}"><title>Region {listed}</title>'
-            f'<path d="{frame.outline(rectangles)}"/></g>'
+            f'<path fill-rule="evenodd" d="{line}"/></g>'
         )
     for demonstration in demonstrations:
         line, first, last = frame.line(demonstration.states)
@@ -164,8 +179,9 @@ def map_svg(
             f'<rect x="{last[0] - 3:g}" y="{last[1] - 3:g}" width="6" height="6"/></g>'
         )
     outlines = [
-        f'<path class="truth" d="{frame.outline(plane.rectangles(truth.box(i)))}"/>'
+        f'<path class="truth" d="{drawn[0]}"/>'
         for i in range(len(truth))
+        if (drawn := frame.region(truth, i))
     ]
     clip = f"clip{number}"
     return (

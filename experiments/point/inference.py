@@ -87,6 +87,7 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         paths,
         hypotheses=hypotheses,
         prior_none=settings.inference.prior,
+        size_prior=settings.inference.size_prior,
         rates=settings.inference.rates(calibrated=forecast_map is not None),
         calibration=forecast_map,
         exact_ends=settings.inference.exact_ends,

@@ -8,9 +8,10 @@ from scipy.special import expit, logit
 
 from experiments.config.settings import Settings
 from experiments.point.truth_tables import box_table
-from mlci.evidence import total_gain
+from mlci.evidence import prior_shares, total_gain
 from mlci.inference import UNAVOIDABLE, Inference
 from mlci.metrics import claims, random_subsets, top_chances, truth_ranks
+from mlci.region_sizes import weights_by_size
 from mlci.rule_breaking import gains_of_subsets
 from mlci.spaces import Floats, Ints
 
@@ -76,7 +77,8 @@ def ranking_table(inference: Inference) -> pd.DataFrame:
     `confidence_alone` is (12), whose product over demonstrations is e^-gain.
     """
     ranking, hypotheses = inference.ranking, inference.hypotheses
-    prior = (1 - inference.prior_none) / len(hypotheses)
+    weights = weights_by_size(hypotheses, inference.size_prior)
+    prior = prior_shares(len(hypotheses), inference.prior_none, weights)
     return pd.DataFrame(
         {
             **box_table("hypothesis", hypotheses),

@@ -13,9 +13,10 @@ from mlci.calibration import (
     similar_tasks,
 )
 from mlci.demonstrations import Demonstration, Task, even_times
-from mlci.forecasts import fit_map, is_possible, region_sizes
+from mlci.forecasts import fit_map, is_possible
 from mlci.grids import Grid
 from mlci.preparation import prepare
+from mlci.region_sizes import region_sizes
 from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator, Pendulum

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from mlci.forecasts import ForecastCurve, ForecastMap, fit_map, region_sizes
+from mlci.forecasts import ForecastCurve, ForecastMap, fit_map
+from mlci.region_sizes import region_sizes
 from mlci.regions import Regions
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import Pendulum

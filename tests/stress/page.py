@@ -29,7 +29,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
 from experiments.page.document import page
-from experiments.page.drawing import places
+from experiments.page.drawing import Frame, places
 from experiments.page.words import where
 from mlci.answers import Answer
 from mlci.evidence import Rates
@@ -230,7 +230,7 @@ def check_planes(driver: webdriver.Chrome, folder: Path) -> None:
     for number, plane in enumerate(planes(regions)):
         Select(driver.find_element(By.ID, "plane")).select_by_index(number)
         shapes = driver.find_elements(By.CSS_SELECTOR, ".map:not([hidden]) .place")
-        for shape, members in zip(shapes, places(regions, plane).values(), strict=True):
+        for shape, members in zip(shapes, places(Frame(plane), regions).values(), strict=True):
             driver.execute_script(
                 "arguments[0].dispatchEvent(new MouseEvent('click', {bubbles: true}))", shape
             )

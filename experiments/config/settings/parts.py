@@ -188,6 +188,13 @@ class InferenceSettings:
     """What is believed before any demonstration, and how much each of them says."""
 
     prior: Annotated[Probability, about("probability that there is no constraint at all")]
+    size_prior: Annotated[
+        NotNegative,
+        about(
+            "a hypothesis has a prior weight of its size to the power of minus this: 0 makes all "
+            "equal, 1 a region of half the size twice as probable"
+        ),
+    ]
     exact_ends: Annotated[
         Flag, about("trajectories of the tabular model begin and end at states, not at cells")
     ]

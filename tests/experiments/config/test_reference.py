@@ -44,7 +44,9 @@ def test_tables_have_a_row_for_every_value_with_its_unit_and_default() -> None:
     for command, kind in COMMANDS.items():
         for key in field_keys(kind):
             is_group = any(other.startswith(f"{key}.") for other in field_keys(kind))
-            inside = key.startswith(("truth.boxes.", "hypotheses.boxes.", "goal."))
+            kinds = ("boxes", "balls", "half_spaces", "shapes")
+            lists = [f"{group}.{of}." for group in ("truth", "hypotheses") for of in kinds]
+            inside = key.startswith((*lists, "goal."))
             if not is_group and not inside:
                 assert f"| `{key}` | " in text, (command, key)
     row = next(line for line in text.splitlines() if line.startswith("| `dt` | "))

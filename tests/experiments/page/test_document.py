@@ -14,7 +14,7 @@ import pytest
 from page_answers import CIRCLE, answer_of
 
 from experiments.page.document import page
-from experiments.page.drawing import places
+from experiments.page.drawing import Frame, places
 from mlci.forecasts import ForecastCurve, ForecastMap
 from mlci.planes import planes
 from mlci.regions import Regions
@@ -114,7 +114,7 @@ def test_regions_of_many_dimensions_lie_on_one_another() -> None:
     text = page(*answer_of(regions, ["a", "b"]), title="Three")
     assert len(list(tree_of(text).iter("option"))) == 3
     for plane, count in zip(planes(regions), (6, 8, 12), strict=True):
-        here = places(regions, plane)
+        here = places(Frame(plane), regions)
         assert len(here) == count
         assert sorted(i for numbers in here.values() for i in numbers) == list(range(24))
 

@@ -1,0 +1,40 @@
+"""Sizes of regions, and prior weights by them.
+
+A larger region lies on the way of more paths, so that keeping out of it explains more, whether or
+not all of it is forbidden. Where regions differ in size a prior can weigh against that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mlci.membership import volume_share
+from mlci.regions import Regions
+from mlci.spaces import Floats
+
+
+def region_sizes(regions: Regions) -> Floats:
+    """Size (C,) of each region: the share of the state space's volume that it holds."""
+    bounds, periodic = regions.space.bounds, regions.space.periodic
+    lower = np.where(periodic, regions.lower, np.maximum(regions.lower, bounds.lower))
+    upper = np.where(periodic, regions.upper, np.minimum(regions.upper, bounds.upper))
+    sizes = np.prod(np.clip((upper - lower) / bounds.widths, 0.0, 1.0), axis=1)
+    for i in np.flatnonzero(~regions.are_boxes).tolist():
+        sizes[i] = volume_share(regions.space, regions.shape(i))
+    return np.asarray(sizes)
+
+
+def weights_by_size(regions: Regions, power: float) -> Floats | None:
+    """Prior weights (C,): size to the power of -power, 0 for a region outside the bounds.
+
+    A power of 1 makes a region of half the size twice as probable, and 0 all equally probable: None.
+
+    Raises:
+        ValueError: a power below 0.
+    """
+    if not 0 <= power < np.inf:
+        raise ValueError(f"the power of a prior by size must be at least 0, not {power}")
+    if power == 0:
+        return None
+    sizes = region_sizes(regions)
+    return np.where(sizes > 0, np.maximum(sizes, np.finfo(float).tiny) ** -power, 0.0)
