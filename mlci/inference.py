@@ -40,8 +40,7 @@ class Inference:
         hypotheses: the C regions.
         names: (N,) names of the demonstrations.
         avoidance: (N, C) alpha, probability that the task's unconstrained agent avoids a
-            hypothesis; 1 where the demonstration says nothing by avoiding it, as where the tabular
-            model cannot do the task.
+            hypothesis; 1 where avoiding it says nothing, as where the task cannot be done.
         violated: (N, C) which hypotheses a demonstration violates.
         reachable: (N,) whether the tabular model can do the task.
         prior_none: prior probability that there is no constraint.
@@ -49,9 +48,8 @@ class Inference:
         calibration: what maps alpha to what simulated demonstrators do; None leaves it as it is.
         rule_breaking: the rate of rule breaking with its interval, where it is estimated from these
             demonstrations, see `with_rule_breaking`.
-        decided_by_cell: (N, C) pairs that are no evidence, since a hypothesis is certain to be
-            entered only because of the cell in which the task starts or ends; none by default. See
-            `mlci.evidence.decided_by_cell`.
+        decided_by_cell: (N, C) pairs that are no evidence, since the cell of a start or goal alone
+            decides, see `mlci.evidence.decided_by_cell`; none by default.
         crossing: what counted as violating a hypothesis.
         sampling: how far `avoidance` may be off; None where nothing is sampled.
         size_prior: prior weights are sizes to the power of minus this, see `mlci.region_sizes`.
@@ -247,8 +245,7 @@ class Inference:
         )
 
     def evidence_frame(self) -> pd.DataFrame:
-        """A row a demonstration and hypothesis: `probability`, Phi; `forecast`, as it counts;
-        `violated`; `evidence` [nat]."""
+        """A row a pair: `probability`, Phi; `forecast`, as it counts; `violated`; `evidence`."""
         import pandas as pd
 
         pairs = [np.array(names, dtype=object) for names in (self.names, self.hypotheses.names)]

@@ -27,7 +27,8 @@ def region_sizes(regions: Regions) -> Floats:
 def weights_by_size(regions: Regions, power: float) -> Floats | None:
     """Prior weights (C,): size to the power of -power, 0 for a region outside the bounds.
 
-    A power of 1 makes a region of half the size twice as probable, and 0 all equally probable: None.
+    A power of 1 makes a region of half the size twice as probable. One of 0 makes all equally
+    probable, and the weights None.
 
     Raises:
         ValueError: a power below 0.

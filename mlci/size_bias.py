@@ -89,7 +89,8 @@ def _rank_correlation(gain: Floats, size: Floats) -> float:
     ranks = [rank_scores(values, values > -np.inf) for values in (gain, size)]
     if len(gain) < _FEW or any(np.ptp(rank) == 0 for rank in ranks):
         return np.nan
-    return float(np.corrcoef(np.stack(ranks))[0, 1])
+    one, other = (rank - np.mean(rank) for rank in ranks)
+    return float(one @ other / np.sqrt((one @ one) * (other @ other)))
 
 
 def _finite(number: float) -> float | None:
