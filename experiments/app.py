@@ -31,7 +31,8 @@ def run() -> int:
 
 def infer() -> int:
     """`mlci-infer`: experiments/infer.py."""
-    return _start("experiments.infer", help_file="infer.txt")
+    of_table = any(word.startswith("table=") for word in sys.argv[1:])
+    return _start("experiments.infer", "infer_table.txt" if of_table else "infer.txt")
 
 
 def advise() -> int:

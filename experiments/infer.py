@@ -18,6 +18,7 @@ import matplotlib
 import numpy as np
 
 import mlci.preparation
+from experiments import infer_table
 from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
 from experiments.config.read import read_recorded_config, writable_results
@@ -72,6 +73,8 @@ def main() -> int:
         0 if every file was used, 1 if some or all could not be, 2 if nothing was done because the
         config is wrong; 130 after Ctrl-C.
     """
+    if any(word.startswith("table=") for word in sys.argv[1:]):
+        return infer_table.main()
     return run_command("infer", lambda tree: infer(read_recorded_config(tree)))
 
 

@@ -70,6 +70,7 @@ from mlci.systems import (
     System,
     TelescopingPendulum,
 )
+from mlci.table_inference import TableInference, infer_table
 from mlci.tables import Table, TablePath, TableRegion
 from mlci.tabular import TabularModel, action_grid, discretize
 
@@ -111,6 +112,7 @@ __all__ = [
     "StateSpace",
     "System",
     "Table",
+    "TableInference",
     "TablePath",
     "TableRegion",
     "TabularModel",
@@ -130,6 +132,7 @@ __all__ = [
     "explore",
     "infer",
     "infer_sets",
+    "infer_table",
     "infer_until_settled",
     "next_tasks",
     "prepare",

@@ -101,18 +101,30 @@ class CausalEntropy:
     def log_probability(self, path: TablePath) -> float:
         """Log probability of the actions of a path, at the states where they were taken [nat].
 
+        -inf where the agent cannot but come to a state that has no moves and is no goal.
+
         Raises:
-            ValueError: a path that the table does not have, or of another number of actions.
+            ValueError: a path that the table does not have, or of another number of actions, unless
+                it has fewer and ends in a goal.
         """
-        self.table.moves_of(path)
-        if self.steps is not None and len(path.actions) != self.steps:
+        early = len(path.actions) < (self.steps or 0) and path.states[-1] in self.table.goals
+        if self.steps is not None and len(path.actions) != self.steps and not early:
             raise ValueError(
                 f"{path.title} has {len(path.actions)} actions, the horizon {self.steps}"
             )
-        log_probability = 0.0
-        for t, (state, action) in enumerate(zip(path.states, path.actions, strict=False)):
-            log_probability += float(np.log(self.policy(t)[state, action]))
-        return log_probability
+        state, row, when = path.states[:-1], self.table.moves_of(path), np.arange(len(path.actions))
+        if self.steps is None:
+            when = np.zeros_like(when)
+            after = self.values
+        else:
+            after = np.vstack([self.values[1:], np.zeros(self.table.states)])
+        chances = self.table.transitions[row].tocoo()
+        expected = np.zeros(len(row))
+        np.add.at(expected, chances.row, chances.data * after[when[chances.row], chances.col])
+        action_value = self.table.reward.ravel()[row] + self.discount * expected
+        possible = action_value > -np.inf
+        value = self.values[when, state]
+        return float(np.sum((action_value - value)[possible])) if np.all(possible) else -np.inf
 
     def _action_values(self, after: Floats) -> Floats:
         """Q (S, A) from the values (S,) of the step after; -inf where there is no move."""
@@ -145,7 +157,8 @@ class CausalEntropy:
         allowed = lasting.table.allowed
         values = np.where(allowed.any(axis=1), 0.0, -np.inf)
         values[self.table.goals] = 0.0
-        lives = values == 0.0
+        if not np.any(lives := values == 0.0):
+            return values
         if self.discount == 1:
             _require_goals(lasting.table)
         policy = allowed / np.maximum(np.sum(allowed, axis=1, keepdims=True), 1)

@@ -71,6 +71,31 @@ def credible_set(
     Raises:
         ValueError: a share out of range.
     """
+    regions, has_none, probability = most_probable(posterior, posterior_none, share)
+    areas = joined_areas(
+        hypotheses, np.sort(regions), lambda group: float(np.sum(posterior[group]))
+    )
+    return CredibleSet(
+        share=share,
+        regions=regions,
+        has_none=has_none,
+        probability=probability,
+        areas=tuple(sorted(areas, key=lambda area: -round(area.probability, _DECIMALS))),
+    )
+
+
+def most_probable(
+    posterior: Floats, posterior_none: float, share: float = 0.95
+) -> tuple[Ints, bool, float]:
+    """The fewest hypotheses that hold a share of the posterior; arguments as of `credible_set`.
+
+    Returns:
+        Their numbers, the most probable first; whether "no constraint" is among them; and what all
+        of them hold.
+
+    Raises:
+        ValueError: a share out of range.
+    """
     if not 0 < share <= 1:
         raise ValueError(f"the share of a credible set must lie in (0, 1], not {share}")
     probability = np.append(posterior_none, posterior)  # "no constraint" wins ties
@@ -79,17 +104,8 @@ def credible_set(
     order = np.argsort(rank, kind="stable")
     held = np.cumsum(probability[order])
     count = min(int(np.searchsorted(held, share - _ROUNDING)) + 1, len(order))
-    regions = order[:count][order[:count] > 0] - 1
-    areas = joined_areas(
-        hypotheses, np.sort(regions), lambda group: float(np.sum(posterior[group]))
-    )
-    return CredibleSet(
-        share=share,
-        regions=regions,
-        has_none=bool(np.any(order[:count] == 0)),
-        probability=float(held[count - 1]),
-        areas=tuple(sorted(areas, key=lambda area: -round(area.probability, _DECIMALS))),
-    )
+    numbers = order[:count]
+    return numbers[numbers > 0] - 1, bool(np.any(numbers == 0)), float(held[count - 1])
 
 
 def neighbours(regions: Regions) -> scipy.sparse.csr_matrix:

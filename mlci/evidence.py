@@ -175,7 +175,14 @@ def rank_constraints(
     Raises:
         ValueError: shapes that disagree, probabilities outside [0, 1].
     """
-    gain = total_gain(log_evidence(avoidance, violated, rates))
+    return rank_evidence(log_evidence(avoidance, violated, rates), violated, prior_none, prior)
+
+
+def rank_evidence(
+    evidence: Floats, violated: ArrayLike, prior_none: float, prior: ArrayLike | None = None
+) -> Ranking:
+    """Rank the hypotheses by log evidence (N, C) [nat]; the rest is as of `rank_constraints`."""
+    gain = total_gain(evidence)
     score = gain
     if prior is not None:
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -26,6 +26,8 @@ from mlci.flows import fixed_point, reached, spectral_radius
 from mlci.spaces import Floats, Ints
 from mlci.tables import Table
 
+_UNDERFLOWS = 1e-290  # probabilities below lose their digits, or are taken for 0
+
 
 @dataclass(frozen=True, eq=False)
 class FirstExit:
@@ -92,6 +94,54 @@ class FirstExit:
         policy[there] = np.exp(value[there] - self.log_z[there, None])
         return policy
 
+    def log_avoidance(self, starts: Ints, regions: Ints) -> Floats:
+        """log alpha (P, L): of making no move of a region, from each of some starts [nat].
+
+        alpha is the probability of coming to a goal by moves of the policy that do not belong to
+        the region, a linear system for each region; where it underflows, Z_i / Z gives its log.
+
+        Args:
+            starts: (P,) states from which a goal can be reached.
+            regions: (L,) numbers of hypotheses.
+
+        Raises:
+            ValueError: a start from which no goal can be reached.
+        """
+        table = self.table
+        self._require_possible(starts)
+        state, action = np.nonzero(policy := self.policy)
+        share, successor = policy[state, action], table.successor[state, action]
+        inner = np.flatnonzero(
+            np.isfinite(self.log_z) & ~np.isin(np.arange(table.states), table.goals)
+        )
+        place = np.full(table.states, -1)
+        place[inner] = np.arange(len(inner))
+        begin, end = place[state], place[successor]
+        belongs = table.crosses[state * table.actions + action].tocsc()
+        result = np.empty((len(starts), len(regions)))
+        for column, region in enumerate(regions.tolist()):
+            kept = np.ones(len(share), dtype=bool)
+            kept[belongs.indices[belongs.indptr[region] : belongs.indptr[region + 1]]] = False
+            within, out = kept & (end >= 0), kept & (end < 0)
+            exits = np.bincount(begin[out], share[out], minlength=len(inner))
+            flow = scipy.sparse.csr_matrix(
+                (share[within], (begin[within], end[within])), shape=(len(inner), len(inner))
+            )
+            alpha = np.append(fixed_point(flow, exits.astype(float)), 1.0)[
+                place[starts]
+            ]  # 1 at a goal
+            with np.errstate(divide="ignore"):
+                result[:, column] = np.log(alpha)
+            if np.any(alpha < _UNDERFLOWS):
+                one = table.mask([list(table.regions)[region]])
+                result[:, column] = FirstExit(table.under(one)).log_z[starts] - self.log_z[starts]
+        return result
+
+    def _require_possible(self, starts: Ints) -> None:
+        """Raise where there is no distribution."""
+        if np.any(stuck := self.log_z[starts] == -np.inf):
+            raise ValueError(f"no goal can be reached from {starts[stuck].tolist()}")
+
     @property
     def expected_visits(self) -> Floats:
         """(S,) expected number of times that a trajectory is in a state, its start and end counted.
@@ -100,8 +150,7 @@ class FirstExit:
             ValueError: a start from which no goal can be reached.
         """
         table = self.table
-        if np.any(stuck := (table.start > 0) & (self.log_z == -np.inf)):
-            raise ValueError(f"no goal can be reached from {np.flatnonzero(stuck).tolist()}")
+        self._require_possible(np.flatnonzero(table.start))
         state, action = np.nonzero(policy := self.policy)
         back = scipy.sparse.csr_matrix(
             (policy[state, action], (table.successor[state, action], state)),

@@ -63,12 +63,14 @@ def select_constraints(
         return float(np.mean(FirstExit(constrained).log_z[starts]))
 
     def decreases(mask: Bools, candidates: Ints) -> Floats:
-        if steps is not None:
+        different, places = np.unique(starts, return_inverse=True)
+        if steps is None:
+            log_alpha = FirstExit(table.under(mask)).log_avoidance(different, candidates)
+        else:
             distribution = FixedHorizon(table.under(mask), steps)
-            alpha = [distribution.avoidance_probabilities(start) for start in starts.tolist()]
-            return np.asarray(-np.mean(np.log(np.array(alpha)[:, candidates]), axis=0))
-        now, each = mean_log_z(mask), np.eye(len(mask), dtype=bool)[candidates]
-        return np.array([now - mean_log_z(mask | one) for one in each])
+            alpha = [distribution.avoidance_probabilities(start) for start in different.tolist()]
+            log_alpha = np.log(np.array(alpha)[:, candidates])
+        return np.asarray(-np.mean(log_alpha[places], axis=0))
 
     added, decrease, following = search(decreases, feasible, least, most, width)
     if prune:

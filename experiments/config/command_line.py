@@ -10,7 +10,7 @@ from pathlib import Path
 from experiments.config.paths import CONF, is_inside_checkout
 from experiments.config.problems import ConfigError
 
-PATHS = ("demonstrations", "results", "tasks")  # keys whose values are paths
+PATHS = ("demonstrations", "results", "table", "tasks")  # keys whose values are paths
 _NOT_TEXT = re.compile(r"[\ud800-\udfff]")  # bytes that are not UTF-8, as Python has them
 
 

@@ -23,7 +23,20 @@ One file a demonstration: a table with columns for time and each state.
 
   python experiments/infer.py demonstrations=recorded
   python experiments/infer.py demonstrations='recorded/*.csv' dt=0.5
-  python experiments/infer.py demonstrations=recorded system=double_integrator""",
+  python experiments/infer.py demonstrations=recorded system=double_integrator
+
+A finite world is given as a file: table=world.yaml --help tells its options.""",
+    "infer_table": """\
+Rank constraints of a finite world from paths through it: which states, actions
+or sets of them did they avoid? One file a path, or a column trial: a row a
+step, with columns state and action.
+
+  python experiments/infer.py table=world.yaml demonstrations=paths
+  python experiments/infer.py table=world.yaml demonstrations='paths/*.csv'
+  python experiments/infer.py table=world.yaml demonstrations=path.csv least=0.5
+
+world.yaml names the moves, start, goals and hypotheses; experiments/README.md
+describes it.""",
     "advise": """\
 Compare discretisations of a system, and recommend one. Needs neither a truth
 nor demonstrations.

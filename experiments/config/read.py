@@ -33,6 +33,7 @@ from experiments.config.settings import (
     RunSettings,
     Settings,
     StudySettings,
+    TableSettings,
 )
 from experiments.config.shape_checks import (
     advice_shape_problems,
@@ -53,6 +54,7 @@ __all__ = [
     "read_advice_config",
     "read_config",
     "read_recorded_config",
+    "read_table_config",
     "resolved_tree",
     "settings_of_record",
     "writable_results",
@@ -116,6 +118,19 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
     _refuse(shape_problems(settings), recorded_shape_problems(settings))
     _refuse(size_problems(settings), soft_problems(settings))
     return settings
+
+
+def read_table_config(tree: Mapping[str, Any]) -> TableSettings:
+    """Settings from a resolved config of experiments/infer.py with a table.
+
+    Raises:
+        ConfigError: listing every problem.
+    """
+    # Of the kind of evidence, the rates alone: a table has no cells and no demonstrator.
+    rates = tree.get("inference")
+    if isinstance(rates, Mapping):
+        tree = {**tree, "inference": _without(rates, ("exact_ends", "calibrate"))}
+    return checked(TableSettings, tree)
 
 
 def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
@@ -207,7 +222,7 @@ def _secret_problems(marked: Mapping[str, Any], written: Mapping[str, Any]) -> I
         written: the same before it was resolved, by dotted keys.
     """
     for key, value in flatten(dict(marked)).items():
-        if _MARK in str(value) and key not in ("results", "demonstrations"):
+        if _MARK in str(value) and key not in ("results", "demonstrations", "table"):
             yield (
                 f"{key}: {written.get(key, value)} would be kept in records, where everybody can "
                 "read a variable of your environment; write its value, if that is no secret"

@@ -19,7 +19,12 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from experiments.config.help_text import Option, help_text
 from experiments.config.paths import CONF
-from experiments.config.settings import AdviceSettings, RecordedSettings, RunSettings
+from experiments.config.settings import (
+    AdviceSettings,
+    RecordedSettings,
+    RunSettings,
+    TableSettings,
+)
 from experiments.config.settings.kinds import MULTIPLE_OF_PI
 from experiments.tracking.files import replace_file
 from experiments.tracking.trees import flatten
@@ -28,6 +33,7 @@ from experiments.tracking.trees import flatten
 COMMANDS: dict[str, Any] = {
     "config": RunSettings,
     "infer": RecordedSettings,
+    "infer_table": TableSettings,
     "advise": AdviceSettings,
 }
 _GROUPS = (
@@ -52,12 +58,13 @@ def schema(command: str) -> dict[str, Any]:
     for node in (tree, *tree["$defs"].values()):
         node.pop("required", None)
     for kind in ("SystemSettings", "ShapeSettings"):
-        target = tree["$defs"][kind]["properties"]["target"]
-        tree["$defs"][kind] = {
-            "type": "object",
-            "properties": {"_target_": {**target, "title": "Target"}},
-            "additionalProperties": True,  # what the class or function takes
-        }
+        if content := tree["$defs"].get(kind):
+            target = {**content["properties"]["target"], "title": "Target"}
+            tree["$defs"][kind] = {
+                "type": "object",
+                "properties": {"_target_": target},
+                "additionalProperties": True,  # what the class or function takes
+            }
     tree["properties"] |= {"defaults": {"type": "array"}, "hydra": {"type": "object"}}
     return tree
 

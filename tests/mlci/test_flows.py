@@ -34,3 +34,30 @@ def test_a_singular_system_has_no_fixed_point() -> None:
 def test_spectral_radius_is_that_of_dense_algebra(flow: list[list[float]]) -> None:
     expected = np.max(np.abs(np.linalg.eigvals(flow)))
     assert spectral_radius(sparse.csr_matrix(flow)) == pytest.approx(expected, rel=1e-6)
+
+
+def ring(states: int, rate: float) -> sparse.csr_matrix:
+    """A flow from each state to the next."""
+    ahead = np.roll(np.arange(states), 1)
+    return sparse.csr_matrix((np.full(states, rate), (np.arange(states), ahead)))
+
+
+def test_a_large_system_that_diverges_is_not_taken_for_its_first_terms() -> None:
+    found = fixed_point(ring(1100, 1.2), np.ones(1100))
+    assert not np.all(found > 0)
+
+
+@pytest.mark.parametrize("kind", ["random", "ring", "slow"])
+def test_large_systems_against_dense_algebra(kind: str) -> None:
+    """Where the series converges, also in turns of many states, and where it does so too late."""
+    states, rng = 1100, np.random.default_rng(0)
+    if kind == "random":
+        cell = rng.integers(0, states, size=(2, 4 * states))
+        flow = sparse.csr_matrix((rng.random(4 * states) / 12, cell), shape=(states, states))
+    else:
+        flow = ring(states, 0.5 if kind == "ring" else 0.9999)
+    source = np.where(np.arange(states) % 50 < 5, rng.random(states), 0.0)
+    expected = np.linalg.solve(np.eye(states) - flow.toarray(), source)
+    found = fixed_point(flow, source)
+    at = np.flatnonzero(np.abs(expected) > 1e-200)
+    np.testing.assert_allclose(found[at], expected[at], rtol=1e-10)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import combinations
 
+import dense_selection as dense
 import numpy as np
 import pytest
 from toy_tables import grid_world, published_grid
@@ -263,3 +264,26 @@ def test_what_cannot_be_selected_by_is_refused() -> None:
         select_regions(evidence, regions.names, width=0)
     with pytest.raises(ValueError, match="selected by demonstrations, and there are none"):
         select_regions(evidence.of_first(0), regions.names)
+
+
+def as_paths(table: Table, paths: list[list[dense.Move]]) -> list[TablePath]:
+    """The oracle's paths for the library."""
+    return [table.path(path[0][0], [action for _, action, _ in path]) for path in paths]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_demonstrations_of_the_grid_against_dense_matrices(seed: int) -> None:
+    """One to eight paths, some alike, that keep out of two random hypotheses."""
+    rng = np.random.default_rng(seed)
+    table, sets = published_grid(), dense.hypotheses()
+    names = [name for name in sets if name not in ("state 0", "state 8", "action 7")]
+    truth = set[dense.Move]().union(*(sets[name] for name in rng.choice(names, 2, replace=False)))
+    paths = [dense.sample(rng, 0, 8, truth, 2.0) for _ in range(rng.integers(1, 6))]
+    paths += paths[: rng.integers(0, 3)]
+    least = float(rng.choice([0.05, 0.1, 0.5]))
+    added, kl, following = dense.select(paths, 8, least)
+    ours = select_constraints(table, as_paths(table, paths), least)
+    assert ours.to_frame()["hypothesis"].tolist() == added
+    np.testing.assert_allclose(ours.kl, kl, atol=1e-8)  # of up to 60 nat, by two solvers
+    assert ours.next_decrease == pytest.approx(following, abs=1e-8)
+    assert len(added) >= 1

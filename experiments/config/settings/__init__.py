@@ -28,6 +28,7 @@ from experiments.config.settings.shapes import (
 )
 from experiments.config.settings.study import RunSettings, StudySettings, SweepSettings
 from experiments.config.settings.system import SystemSettings, system_class
+from experiments.config.settings.world import TableSettings
 
 __all__ = [
     "ESTIMATE",
@@ -55,6 +56,7 @@ __all__ = [
     "SubjectSettings",
     "SweepSettings",
     "SystemSettings",
+    "TableSettings",
     "TaskSettings",
     "TransitionSettings",
     "TruthSettings",

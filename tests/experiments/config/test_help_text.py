@@ -16,7 +16,7 @@ from experiments.config.paths import CHECKOUT, CONF
 from experiments.config.reference import COMMANDS, help_of, options
 from experiments.terminal import WIDTH
 
-MAINS = {"config": app.run, "infer": app.infer, "advise": app.advise}
+MAINS = {"config": app.run, "infer": app.infer, "infer_table": app.infer, "advise": app.advise}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -41,7 +41,8 @@ def test_a_line_has_meaning_unit_choices_and_default() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_and_version_need_nothing_that_takes_time(command: str, tmp_path: Path) -> None:
-    done = run_here(MAINS[command], "dt=nonsense", "--help", folder=tmp_path)
+    nonsense = "table=nonsense" if command == "infer_table" else "dt=nonsense"
+    done = run_here(MAINS[command], nonsense, "--help", folder=tmp_path)
     assert (done.returncode, done.stdout) == (0, help_of(command))
     done = run_here(MAINS[command], "--version", folder=tmp_path)
     assert done.returncode == 0

@@ -72,7 +72,8 @@ def test_no_shared_value_stands_in_a_command_too() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_conf_holds_every_key_of_the_settings(command: str) -> None:
-    words = ["demonstrations=x.csv"] if command == "infer" else []
+    words = ["demonstrations=x.csv"] if command.startswith("infer") else []
+    words += ["table=x.yaml"] if command == "infer_table" else []
     tree = composed(*words, name=command)
     assert set(schema(command)["properties"]) - {"defaults", "hydra"} <= set(tree)
 
