@@ -27,7 +27,8 @@ from mlci.credible_sets import most_probable
 from mlci.evidence import Rates
 from mlci.recordings.recording import Remark, shown_path
 from mlci.recordings.table_paths import read_table_paths
-from mlci.selection import Selection, select_constraints
+from mlci.selection import select_constraints
+from mlci.set_search import Selection
 from mlci.table_inference import TableInference, is_certain
 from mlci.tables import TablePath
 
