@@ -168,8 +168,7 @@ def rank_constraints(
         avoidance: (N, C) as of `log_evidence`.
         violated: (N, C) which hypotheses each demonstration violates.
         prior_none: prior probability that there is no constraint.
-        prior: (C,) prior weights of the hypotheses, which then count for their rank; equal by
-            default.
+        prior: (C,) prior weights of hypotheses, which then count for rank; equal by default.
         rates: model error and rule breaking.
 
     Raises:
@@ -182,8 +181,7 @@ def rank_evidence(
     evidence: Floats, violated: ArrayLike, prior_none: float, prior: ArrayLike | None = None
 ) -> Ranking:
     """Rank the hypotheses by log evidence (N, C) [nat]; the rest is as of `rank_constraints`."""
-    gain = total_gain(evidence)
-    score = gain
+    gain = score = total_gain(evidence)
     if prior is not None:
         with np.errstate(divide="ignore", invalid="ignore"):
             score = gain + np.log(prior_shares(gain.shape[-1], prior_none, prior))
