@@ -1,12 +1,15 @@
 """The configs of a sweep's points: each choice of groups is composed once.
 
 Hydra reads every file anew for every point. But values that a point sets itself are put over what
-its groups compose to; so points which differ in values alone share all that comes before.
+its groups compose to; so points which differ in values alone share all that comes before. Where
+nothing refers to anything else, they also share the parts of the config in which they set nothing.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from copy import deepcopy
 from functools import cache
 from typing import Any
 
@@ -17,6 +20,9 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from experiments.config.read import plain_tree, resolved_tree
+
+_REFERENCE = "${"  # opens what another key's value, or a variable's, is put in place of
+_TOP_KEY = re.compile(r"[.\[]")  # ends it
 
 
 class Composer:
@@ -39,13 +45,18 @@ class Composer:
         overrides = [self._parsed(word) for word in job]
         values = [override for override in overrides if self._sets_a_value(override)]
         choices = [word for word, each in zip(job, overrides, strict=True) if each not in values]
-        config = OmegaConf.create(self._chosen(tuple(choices)), flags={"struct": True})
+        composed, has_references = self._chosen(tuple(choices))
+        parts = composed
+        if not has_references and not any(_REFERENCE in word for word in job):
+            changed = {_TOP_KEY.split(override.key_or_group)[0] for override in values}
+            parts = {key: composed[key] for key in composed if key in changed}
+        config = OmegaConf.create(parts, flags={"struct": True})
         try:
             for override in values:
                 OmegaConf.update(config, override.key_or_group, override.value(), merge=True)
         except OmegaConfBaseException:  # Hydra says better what is wrong
             return plain_tree(self._loader.load_sweep_config(self._base, list(job)))
-        return resolved_tree(config)
+        return deepcopy(composed) | resolved_tree(config)
 
     def _sets_a_value(self, override: Override) -> bool:
         """Whether an override changes a value that is there once the groups are composed."""
@@ -57,8 +68,8 @@ class Composer:
             and not self._is_group(key)
         )
 
-    def _compose(self, choices: tuple[str, ...]) -> dict[str, Any]:
-        """What Hydra composes, not resolved yet, without its own part."""
+    def _compose(self, choices: tuple[str, ...]) -> tuple[dict[str, Any], bool]:
+        """What Hydra composes, not resolved yet and without its part; whether it has references."""
         config: Any = OmegaConf.to_container(self._loader.load_sweep_config(self._base, [*choices]))
         config.pop("hydra")
-        return dict(config)
+        return dict(config), _REFERENCE in str(config)

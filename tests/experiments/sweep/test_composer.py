@@ -1,6 +1,7 @@
 """A sweep's configs are those that Hydra composes, each choice of groups composed once."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -62,6 +63,21 @@ def test_configs_are_those_of_hydra_and_groups_are_composed_once(loader: Countin
     assert loader.composed == 2
     assert trees == [plain_tree(loader.load_sweep_config(base, job)) for job in jobs]
     assert trees[2]["dt"] == trees[2]["horizon"]
+
+
+def test_what_a_file_refers_to_is_followed(loader: Counting, tmp_path: Path) -> None:
+    (tmp_path / "truth").mkdir()
+    (tmp_path / "truth" / "mine.yaml").write_text("# @package _global_\nrollouts: ${misfit}\n")
+    compose, base = composer(loader, f"hydra.searchpath=[{tmp_path}]")
+    for job in (["truth=mine", "misfit=3"], ["truth=mine", "dt=0.5", "misfit=4"]):
+        assert compose.tree(job) == plain_tree(loader.load_sweep_config(base, job))
+    assert compose.tree(["truth=mine", "misfit=3"])["rollouts"] == 3
+
+
+def test_points_share_no_part_of_a_config_that_one_could_change(loader: Counting) -> None:
+    compose, _ = composer(loader)
+    compose.tree(["dt=0.5"])["tasks"]["lower"] = "changed"
+    assert compose.tree(["dt=0.25"])["tasks"]["lower"] != "changed"
 
 
 @pytest.mark.parametrize("word", ["+note=1", "~safety.width", "hydra.job.name=third"])
