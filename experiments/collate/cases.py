@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from experiments.collate.finished import LAST_OPENING
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def case_names(plan: Mapping[str, Sequence[str]]) -> dict[str, str]:
@@ -45,6 +47,8 @@ def case_table(
     """
     if not any(point in names for point in points):
         return None
+    import pandas as pd
+
     rows = pd.read_csv(summary, dtype=str, keep_default_na=False)
     rows = rows[list(rows.columns[: rows.columns.get_loc(LAST_OPENING)])]
     cases = [names.get(point, "") for point in points]

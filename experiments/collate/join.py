@@ -19,6 +19,7 @@ import pandas as pd
 
 from experiments.collate.cases import case_names, case_table
 from experiments.collate.chosen_tasks import chosen_tasks, early_overlap, unfound
+from experiments.collate.current import made_of
 from experiments.collate.evidence_kinds import evidence_kinds
 from experiments.collate.examples import example_tables
 from experiments.collate.finished import CollateError, FinishedPoint
@@ -91,7 +92,7 @@ def collate(
             write(name, [csv_bytes(rounded(frame))])
         _publish(new, tables, set(former))
         records = {point.identity: point.record for point in finished}
-        write_collated(folder, collated(records, digests, kept))
+        write_collated(folder, collated(records, digests, kept, made_of(records, study)))
     finally:
         shutil.rmtree(new, ignore_errors=True)
     return [tables / name for name in sorted(digests)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from experiments.collate.current import made_of
 from experiments.lookback.archive import Facts, count_states
 from experiments.tracking import figure_notes
 from experiments.tracking.own_modules import on_path
@@ -62,6 +63,8 @@ def table_concerns(study: Study, points: Sequence[Facts]) -> list[str]:
         # Clocks go back; numbers of attempts do not.
         if sources != collated.sources or attempts != list(collated.attempts or attempts):
             concerns.append("points have run again since")
+        elif collated.made_of != made_of(records, study):
+            concerns.append("the study's last sweep was stopped before it wrote them")
     if len(collated.sources) > 1:
         concerns.append(f"they mix {len(collated.sources)} versions of the source")
     if collated.points and collated.made_by != table_source():

@@ -14,6 +14,7 @@ from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig
 from tqdm import tqdm
 
+from experiments.collate.current import is_current
 from experiments.config.explain import explain
 from experiments.config.paths import results_folder
 from experiments.config.read import ConfigError, resolved_tree, writable_results
@@ -100,10 +101,13 @@ class Planner(Sweeper):
             left = len(plan) - len(finished)
             print(f"{left} of {counted(len(plan), 'point')} left, and no table is written")
             return
-        from experiments.collate.join import collate  # pandas
-
         points = [planned.point for planned in plan]
         with publication_lock(folder):
+            if is_current(points, folder, mixed=options.mix_sources):
+                print(f"up to date: {folder / 'tables'}")
+                return
+            from experiments.collate.join import collate  # pandas
+
             for table in collate(points, folder, mixed=options.mix_sources):
                 print(f"written: {table}")
 

@@ -50,6 +50,7 @@ def study_fault(study: Study) -> str | None:
             "sources": isinstance(collated.sources, Mapping)
             and all(isinstance(count, int) for count in collated.sources.values()),
             "made_by": isinstance(collated.made_by, str),
+            "made_of": isinstance(collated.made_of, str),
             "seconds": isinstance(collated.seconds, _NUMBER),
             "peak_memory_mb": isinstance(collated.peak_memory_mb, _NUMBER),
             "attempts": isinstance(collated.attempts, tuple)

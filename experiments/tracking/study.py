@@ -13,7 +13,8 @@
 
 What differs each time that the same is computed stands in `runs.json` beside it:
 
-{"attempts": [of each point, in that order],
+{"made_of": hash of the points' records, the plan's cases and its examples,
+ "attempts": [of each point, in that order],
  "started": [first, last], "seconds": of all points, "peak_memory_mb": the most of one,
  "machines": [name, ...]}
 """
@@ -33,7 +34,7 @@ from experiments.tracking.sources import source_hash
 from experiments.tracking.trees import plain
 
 RUNS = "runs.json"
-_OF_RUNS = ("attempts", "started", "seconds", "peak_memory_mb", "machines")
+_OF_RUNS = ("made_of", "attempts", "started", "seconds", "peak_memory_mb", "machines")
 _COLLATES = "experiments.collate.join"  # named, so that its source counts, and not imported
 
 
@@ -60,6 +61,7 @@ class Collated:
         tables: sha256 of each table, by its file's name.
         kept: those that were there before and agree with the new ones, which differ by rounding.
         attempts: number of the attempt that each point finished in.
+        made_of: hash of the points' records, and of what of the plan tables depend on.
     """
 
     points: tuple[str, ...]
@@ -76,6 +78,7 @@ class Collated:
     peak_memory_mb: int = 0
     machines: tuple[str, ...] = ()
     attempts: tuple[int, ...] = ()
+    made_of: str = ""
 
 
 def table_source() -> str:
@@ -84,7 +87,10 @@ def table_source() -> str:
 
 
 def collated(
-    records: Mapping[str, Mapping[str, Any]], tables: Mapping[str, str], kept: Iterable[str] = ()
+    records: Mapping[str, Mapping[str, Any]],
+    tables: Mapping[str, str],
+    kept: Iterable[str] = (),
+    made_of: str = "",
 ) -> Collated:
     """What tables came from, of the records of their points.
 
@@ -92,6 +98,7 @@ def collated(
         records: by identity, in the order of the tables' rows.
         tables: sha256 of each table, by its file's name.
         kept: those that were there before and agree with the new ones.
+        made_of: hash of all that they are made of.
     """
     each = list(records.values())
     started = [record["started"] for record in each]
@@ -116,6 +123,7 @@ def collated(
         tables=tables,
         kept=tuple(sorted(kept)),
         attempts=tuple(int(record.get("attempt", 1)) for record in each),
+        made_of=made_of,
     )
 
 
@@ -183,8 +191,8 @@ def _runs(folder: Path) -> dict[str, Any]:
     """What is told of how a study's points ran; nothing where it cannot be read."""
     try:
         runs = read_sealed(_listing(folder, RUNS))
-        return {key: runs[key] for key in _OF_RUNS}
-    except (OSError, SealError, KeyError):
+        return {key: runs[key] for key in _OF_RUNS if key in runs}
+    except (OSError, SealError):
         return {}
 
 

@@ -369,6 +369,7 @@ def test_status_is_up_to_date_after_a_sweep(settings: Settings, tmp_path: Path, 
         ("stale", "2 points are stale", "2 points are stale"),
         ("rerun", "points have run again since", None),
         ("replan", "other points than the study's last sweep", "1 point is missing"),
+        ("rename", "the study's last sweep was stopped before it wrote them", None),
     ],
 )
 def test_status_tells_why_not(
@@ -400,6 +401,8 @@ def test_status_tells_why_not(
         collate(points, tmp_path / "s")
     elif harm == "rerun":
         computed(dataclasses.replace(settings, dt=1.0), tmp_path, force=True)
+    elif harm == "rename":
+        write_plan(tmp_path / "s", [(point, ["case=other"]) for point in points])
     else:
         missing = planned(dataclasses.replace(settings, dt=0.1), tmp_path)
         write_plan(tmp_path / "s", [(missing, [])])

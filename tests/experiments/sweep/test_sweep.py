@@ -20,6 +20,8 @@ from experiments.app import REFUSED
 from experiments.config.read import ConfigError
 from experiments.sweep.planner import Planner
 from experiments.terminal import job_names
+from experiments.tracking.points import Point
+from experiments.tracking.study import write_plan
 
 
 def test_tables_do_not_depend_on_workers_order_or_repetition(tmp_path: Path) -> None:
@@ -40,6 +42,28 @@ def test_tables_do_not_depend_on_workers_order_or_repetition(tmp_path: Path) -> 
     assert status == 0
     assert "2 points: 2 done; 0 to run" in out
     assert tables(one, "s") == tables(two, "again")
+
+
+def test_tables_are_written_again_only_if_they_would_change(tmp_path: Path) -> None:
+    def sweep(case: str) -> str:
+        status, out, err = run_here(tmp_path, "-m", f"case='{case}'", "study=s")
+        assert status == 0, err
+        return out
+
+    def case() -> str:
+        return tables(tmp_path, "s")["cases.csv"].decode()
+
+    folder = tmp_path / "results" / "s"
+    assert f"written: {folder / 'tables' / 'cases.csv'}" in sweep("kind: one")
+    before = tables(tmp_path, "s")
+    assert f"up to date: {folder / 'tables'}\n" in sweep("kind: one")
+    assert tables(tmp_path, "s") == before
+    # A sweep that is stopped once it has written its plan.
+    (identity,) = (folder.parent / "points").iterdir()
+    write_plan(folder, [(Point(folder.parent, identity.name), ["case='kind: two'"])])
+    assert "kind: one" in case()
+    assert "written: " in sweep("kind: two")
+    assert "kind: two" in case()
 
 
 def test_single_run_shows_its_log_again_when_it_was_finished(tmp_path: Path) -> None:
