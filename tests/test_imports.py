@@ -61,6 +61,8 @@ MLCI = {
     "mlci.causal_entropy": "mlci.flows mlci.tables",
     "mlci.joint_avoidance": "mlci.recursions",
     "mlci.fixed_horizon": "mlci.joint_avoidance mlci.tables",
+    "mlci.best_areas": "mlci.evidence",
+    "mlci.planar_point": "mlci.systems",
     "mlci.chains": "mlci.spaces",
     "mlci.set_evidence": "mlci.inference mlci.maxent",
     "mlci.sets": "mlci.chains mlci.set_evidence",

@@ -8,6 +8,8 @@ from scipy.special import expit, logit
 
 from experiments.config.settings import Settings
 from experiments.point.truth_tables import box_table
+from mlci.best_areas import area_scores
+from mlci.credible_sets import neighbours
 from mlci.evidence import prior_shares, total_gain
 from mlci.inference import UNAVOIDABLE, Inference
 from mlci.metrics import claims, random_subsets, top_chances, truth_ranks
@@ -23,17 +25,20 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
 
     Beside the rank of the truth, if there is one, its columns are shares: whether that rank is
     among the first, and whether the best hypothesis, or both of the best two, overlap the truth
-    or lie inside it; `claim` is the posterior probability of the best.
+    or lie inside it, and of the most probable area whether it overlaps the truth, the share of its
+    regions that do, and the share of all regions that it takes; `claim` is the posterior
+    probability of the best.
     """
     hypotheses, constraint = inference.hypotheses, settings.constraint
     truth = hypotheses.inside(constraint)
     good = {"overlap": hypotheses.overlaps(constraint), "inside": truth}
     compared = [top for top in BEST if top <= len(hypotheses)] if len(constraint) else []
-    ranks = settings.ranks
+    ranks, touching = settings.ranks, neighbours(hypotheses)
     rows = []
     for subsets in random_subsets(len(inference.names), ranks.demonstrations, ranks.subsets, rng):
         gains = _gains(inference, subsets)
         rank = truth_ranks(gains, truth)
+        area = vars(area_scores(gains, touching, good["overlap"]))
         in_top = (rank <= ranks.top).astype(int) if truth.any() else np.nan
         rows.append(
             pd.DataFrame(
@@ -49,6 +54,10 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
                         else np.nan
                         for name, which in good.items()
                         for top in BEST
+                    },
+                    **{
+                        f"area_{name}": values if compared else np.nan
+                        for name, values in area.items()
                     },
                     "claim": claims(gains, inference.prior_none),
                 }

@@ -20,6 +20,11 @@ SHARES = {
     "top_1_inside": "the best lies inside it",
     "top_2_inside": "both of the best two do",
 }
+AREA = {
+    "area_overlap": "the most probable area overlaps the truth",
+    "area_precision": "share of its regions that do",
+    "area_share": "share of all regions that it takes",
+}
 SIZES = (1, 3, 5, 10, 20)  # demonstrations that are listed
 CROSSING = "tasks.crossing"
 EVIDENCE = "truth_probability"
@@ -65,7 +70,7 @@ def claim(results: Results) -> Claim:
                 [Check("all points", minutes <= MINUTES, f"{number(minutes, 2)} minutes")],
             ),
         ],
-        numbers=_numbers(rows)
+        numbers=_numbers(results, rows)
         + f"\nA point takes {number(60 * minutes, 2)} s on average, on one core; what points share "
         "counts once.\n",
         why=_why(rows),
@@ -103,7 +108,26 @@ def _success(rows: pd.DataFrame) -> str:
     )
 
 
-def _numbers(rows: pd.DataFrame) -> str:
+def _areas(results: Results) -> str:
+    """What the most probable area is worth, a line for each row of the default case."""
+    columns = [f"{name}{end}" for name in AREA for end in ("", "_low", "_high")]
+    try:
+        curve = results.table(STUDY, "rank_curve", columns)
+    except Missing as missing:
+        return f"{missing}.\n"
+    cases = results.table(STUDY, "cases")
+    keys = [name for name in cases if name not in ("case", "choice", "value")]
+    rows = cases[cases["case"] == DEFAULT].merge(curve, on=keys)
+    return table(
+        ["tasks", "demonstrations", *AREA.values()],
+        [
+            [WORDS[row[CROSSING]], row["demonstrations"], *(_share(row, name) for name in AREA)]
+            for row in rows[rows["demonstrations"].isin(SIZES)].to_dict("records")
+        ],
+    )
+
+
+def _numbers(results: Results, rows: pd.DataFrame) -> str:
     """How often the best hypotheses meet the truth, by number of demonstrations and by case."""
     sizes = [size for size in (PAPER, 2 * PAPER) if size in set(rows["demonstrations"])]
     cases = []
@@ -117,6 +141,10 @@ def _numbers(rows: pd.DataFrame) -> str:
         "Success by default: share of random sets of demonstrations; a tied set counts by its "
         "chance.\n\n"
         + _success(rows[rows["demonstrations"].isin(SIZES)])
+        + "\nThe same for the most probable *area*: the best region, with those that hang together "
+        "with it by common borders and are at least half as probable. An "
+        "area that takes many regions overlaps the truth easily.\n\n"
+        + _areas(results)
         + "\nBoth of the best two, when one choice is changed, after "
         + " and ".join(str(size) for size in sizes)
         + " demonstrations. *Evidence* is the mean probability that an agent without constraint, "
