@@ -11,9 +11,10 @@ from experiments.terminal import WIDTH, entry, table_lines, words
 from mlci.answers import Answer, listed
 from mlci.diagnosis import Diagnosis
 from mlci.inference import Inference
+from mlci.sets import SetPosterior
 from mlci.spaces import Box, StateSpace
 
-_AREAS, _CARRIERS = 3, 4  # that are printed
+_AREAS, _CARRIERS, _MARGINALS = 3, 4, 5  # that are printed
 
 
 def trial_lines(counts: Mapping[str, int]) -> list[str]:
@@ -80,6 +81,38 @@ def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) 
         yield from entry("soft or hard?", f"region {estimate.region} {estimate}")
     for warning in answer.warnings:
         yield from entry("warning", warning)
+
+
+def set_lines(sets: SetPosterior | None, names: Sequence[str]) -> Iterator[str]:
+    """The most probable set, the regions that are most probably forbidden, and how sure that is."""
+    if sets is None:
+        return
+    best, marginal = sets.most_probable(), sets.marginal
+    first = np.argsort(-marginal, kind="stable")[:_MARGINALS]
+    likely = ", ".join(f"{names[i]} {probability(marginal[i])}" for i in first)
+    members = f"of {listed([names[i] for i in best])}" if best else "that forbids nothing"
+    yield from entry(
+        "sets",
+        f"the most probable set is that {members}, with probability "
+        f"{probability(sets.probability_of(best))}; forbidden, alone or with others: {likely}",
+    )
+    if sets.check is not None:
+        yield from entry("", str(sets.check))
+        if not sets.check.agrees:
+            yield from entry("warning", "chains over sets disagree: raise inference.sets.steps")
+
+
+def refutation_lines(inference: Inference) -> list[str]:
+    """Which hypotheses each demonstration refutes, by their numbers; * where it alone does."""
+    alone = np.sum(inference.violated, axis=0) == 1
+    lines = entry("", "hypotheses that each refutes (* no other does):")
+    for name, violated, reachable in zip(
+        inference.names, inference.violated, inference.reachable, strict=True
+    ):
+        numbers = [f"{i}{'*' if alone[i] else ''}" for i in np.flatnonzero(violated)]
+        note = [] if reachable else ["(goal unreachable: adds no gain)"]
+        lines += entry("", " ".join([name, *numbers, *note]), hang=2)
+    return lines
 
 
 def _first_words(answer: Answer) -> str:
@@ -181,19 +214,6 @@ def _side(box: Box, d: int) -> str:
     if not np.isfinite(box.lower[d]):
         return "any"
     return f"{box.lower[d]:.4g} to {box.upper[d]:.4g}"
-
-
-def refutation_lines(inference: Inference) -> list[str]:
-    """Which hypotheses each demonstration refutes, by their numbers; * where it alone does."""
-    alone = np.sum(inference.violated, axis=0) == 1
-    lines = entry("", "hypotheses that each refutes (* no other does):")
-    for name, violated, reachable in zip(
-        inference.names, inference.violated, inference.reachable, strict=True
-    ):
-        numbers = [f"{i}{'*' if alone[i] else ''}" for i in np.flatnonzero(violated)]
-        note = [] if reachable else ["(goal unreachable: adds no gain)"]
-        lines += entry("", " ".join([name, *numbers, *note]), hang=2)
-    return lines
 
 
 def measure_lines(summary: pd.Series, ranks: pd.DataFrame, top: int) -> Iterator[str]:

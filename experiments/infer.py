@@ -23,7 +23,7 @@ from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
 from experiments.config.read import read_recorded_config, writable_results
 from experiments.config.settings import ESTIMATE, RecordedSettings
-from experiments.console import answer_lines, diagnosis_lines, refutation_lines
+from experiments.console import answer_lines, diagnosis_lines, refutation_lines, set_lines
 from experiments.lookback.recordings import CALIBRATION
 from experiments.page.document import page
 from experiments.point.forecasts import exported_calibration, recorded_calibration
@@ -35,6 +35,8 @@ from experiments.point.recorded import (
     together,
 )
 from experiments.point.recorded_tables import demonstration_tables, path_table
+from experiments.point.sets import set_belief, set_record
+from experiments.point.stages import discretized_model
 from experiments.progress import begin, steps_shown
 from experiments.terminal import complain, counted, entry, say
 from experiments.tracking.environment import environment
@@ -51,7 +53,8 @@ from mlci.recordings.files import user_path
 from mlci.recordings.plausibility import Plausibility, summary
 from mlci.recordings.read import Readings
 from mlci.recordings.recording import Remark, shown_path
-from mlci.tabular import TabularModel, discretize
+from mlci.sets import SetPosterior
+from mlci.tabular import TabularModel
 from mlci.temperature import estimate_temperature
 
 ON_WRONG_MODELS = (
@@ -101,14 +104,16 @@ def infer(settings: RecordedSettings) -> int:
     checks = plausibilities(settings, demonstrations)
     say(_doubt_lines(checks))
     begin("forming the tabular model")
-    model = _tabular_model(settings)
+    model = discretized_model(settings, settings.candidates)
     if settings.inference.calibrate and calibration is None:
         store = Store(results / "store")
         calibration = recorded_calibration(settings, model, demonstrations, store)
     result = _answer(settings, model, demonstrations, calibration, summary(checks))
+    begin("weighing sets of hypotheses")
+    sets = set_belief(settings, model, demonstrations, result.inference, np.random.default_rng(0))
     begin("drawing the map")
     # All is saved before it is printed, in case nobody reads on.
-    folder = _save(settings, demonstrations, problems, result, checks)
+    folder = _save(settings, demonstrations, problems, result, checks, sets)
     diagnosis, count = diagnose(model), len(demonstrations)
     unreachable = int(np.sum(~result.inference.reachable))
     doubtful = [check for check in checks if check.doubts]
@@ -118,6 +123,7 @@ def infer(settings: RecordedSettings) -> int:
     begin("")
     for line in (
         *_answer_lines(settings, result, calibration),
+        *set_lines(sets, result.inference.hypotheses.names),
         f"demonstrations  {count} used, {counted(len(problems), 'file')} not used",
         *refutation_lines(result.inference),
         *diagnosis_lines(diagnosis, space.names, unreachable, count),
@@ -196,19 +202,6 @@ def _answer_lines(
     return lines
 
 
-def _tabular_model(settings: RecordedSettings) -> TabularModel:
-    """The tabular model with all hypotheses."""
-    return discretize(
-        settings.model,
-        settings.cells,
-        settings.action_values,
-        settings.dt,
-        settings.candidates,
-        settings.transition.samples,
-        settings.temperature,
-    )
-
-
 def _doubt_lines(checks: Sequence[Plausibility]) -> list[str]:
     """A paragraph for each recording that is doubtful, and how many are not."""
     doubtful = [check for check in checks if check.doubts]
@@ -223,6 +216,7 @@ def _save(
     problems: Sequence[Remark],
     result: Answer,
     checks: Sequence[Plausibility],
+    sets: SetPosterior | None,
 ) -> Path:
     """Write tables, map and record into a folder of their own, named by what went in."""
     space, inference = settings.model.space, result.inference
@@ -243,7 +237,11 @@ def _save(
     for name, table in tables.items():
         replace_file(folder / f"{name}.csv", csv_bytes(table))
     replace_file(folder / "map.png", _map(inference, demonstrations))
-    answer_record = {**result.record(), "recordings": [each.record(space) for each in checks]}
+    answer_record = {
+        **result.record(),
+        "sets": None if sets is None else set_record(sets, inference.hypotheses.names),
+        "recordings": [each.record(space) for each in checks],
+    }
     replace_file(folder / "answer.json", _json_bytes(answer_record))
     record = {
         **made_from,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import comb
+from math import comb, log
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -106,7 +106,7 @@ class SetPrior:
         """log P of a set of a size, neighbours left out."""
         if size > min(self.largest, count) or not self.sizes[size] > 0:
             return -np.inf
-        return float(np.log(self.sizes[size]) - np.log(comb(count, size)))
+        return log(self.sizes[size]) - log(comb(count, size))  # of numbers of any length
 
 
 @dataclass(frozen=True, eq=False)

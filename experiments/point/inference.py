@@ -9,7 +9,9 @@ import numpy as np
 from experiments.config.settings import ESTIMATE, Settings
 from experiments.point.forecasts import forecast_calibration
 from experiments.point.no_answer import NoAnswer, why_none
+from experiments.point.sets import set_belief
 from experiments.point.stages import tabular_model
+from experiments.point.streams import Purpose, stream
 from experiments.point.trials import TrialSet, demonstrations
 from experiments.tracking.store import Store
 from mlci.answers import Answer, answer
@@ -18,6 +20,7 @@ from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.inference import Inference
 from mlci.preparation import infer
+from mlci.sets import SetPosterior
 from mlci.spaces import Bools, Ints
 from mlci.tabular import TabularModel
 
@@ -36,6 +39,7 @@ class PointInference:
         inference: from the N demonstrations about the C hypotheses.
         diagnosis: how the model moves.
         calibration: how often the model's forecasts come true, where evidence is to be calibrated.
+        sets: belief over sets of hypotheses, where it is asked for.
     """
 
     trials: TrialSet
@@ -47,6 +51,7 @@ class PointInference:
     inference: Inference
     diagnosis: Diagnosis
     calibration: Calibration | None = None
+    sets: SetPosterior | None = None
 
     @property
     def unreachable(self) -> int:
@@ -105,6 +110,9 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         inference=inference,
         diagnosis=diagnose(model),
         calibration=calibration,
+        sets=set_belief(
+            settings, model, paths, inference, stream(settings.seed, Purpose.SETS, 0), hypotheses
+        ),
     )
 
 

@@ -8,7 +8,13 @@ import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
-from experiments.console import answer_lines, diagnosis_lines, measure_lines, trial_lines
+from experiments.console import (
+    answer_lines,
+    diagnosis_lines,
+    measure_lines,
+    set_lines,
+    trial_lines,
+)
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
 from experiments.point.tables import point_tables
@@ -37,6 +43,8 @@ def run_point(
     covered = np.flatnonzero(inference.hypotheses.inside(settings.constraint)).tolist()
     begin("")
     for line in answer_lines(result, top, covered):
+        log(line)
+    for line in set_lines(inferred.sets, inference.hypotheses.names):
         log(line)
     if inferred.calibration is not None:
         for line in entry("calibration", inferred.calibration.summary()):

@@ -80,7 +80,7 @@ def tabular_model(settings: Settings, store: Store) -> TabularModel:
         temperature=settings.temperature,
     )
     if not moves_are_kept(model.states, model.moves):
-        return _discretize(settings, model.regions)
+        return discretized_model(settings, model.regions)
     stored = _discretized(settings, store, "mdp", hypotheses, (*_MOVES, *_CROSSINGS))
     # Apart, so that points which differ in the truth share what takes the time.
     apart = _discretized(settings, store, "mdp_truth", truth, _CROSSINGS)
@@ -115,7 +115,7 @@ def _discretized(
     """Arrays of the tabular model with the crossings of some regions, stored or computed."""
 
     def compute() -> dict[str, np.ndarray]:
-        kept = _discretize(settings, regions).kept
+        kept = discretized_model(settings, regions).kept
         assert kept is not None  # it is not too large
         arrays = {name: getattr(kept, name) for name in _MOVES}
         arrays |= {name: getattr(kept.crosses, name) for name in _CROSSINGS}
@@ -126,7 +126,7 @@ def _discretized(
     return store.get(stage, model_inputs(settings, regions), modules, compute)
 
 
-def _discretize(settings: Settings, regions: Regions) -> TabularModel:
+def discretized_model(settings: ModelSettings, regions: Regions) -> TabularModel:
     """The tabular model with the crossings of some regions."""
     return discretize(
         settings.model,

@@ -21,6 +21,7 @@ class Purpose(IntEnum):
     SENSOR_NOISE = 4
     EVIDENCE = 5
     NEXT_TASK = 6
+    SETS = 7
 
 
 def stream(seed: int, purpose: Purpose, *index: int) -> np.random.Generator:

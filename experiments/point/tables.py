@@ -13,6 +13,7 @@ from experiments.point.inference import PointInference
 from experiments.point.measures import Measures
 from experiments.point.next_task_tables import next_task_table
 from experiments.point.ranking_tables import rank_table, ranking_table
+from experiments.point.sets import set_tables
 from experiments.point.streams import Purpose, stream
 from experiments.point.trajectory_tables import (
     probability_table,
@@ -46,8 +47,9 @@ def point_tables(
         row a hypothesis, ranked with all of them, and `first`, with the first FIRST of them;
         `summary`, one row; `sampled`, `violations`, `moves` and `probabilities`, of single
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
-        `dimensions` of the state, and `regions` of the truth. If asked for, `calibration`, and
-        `evidence` and `forecasts` where these are calibrated; and `next_task`.
+        `dimensions` of the state, and `regions` of the truth. If asked for, `sets` and
+        `set_marginals`; `calibration`, and `evidence` and `forecasts` where these are calibrated;
+        and `next_task`.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -75,6 +77,8 @@ def point_tables(
     if settings.misfit:
         # About one in 50 of the model's own trajectories is.
         tables["trials"]["rare"] = np.where(inference.reachable, compared.is_rare, np.nan)
+    if point.sets is not None:
+        tables |= set_tables(point.sets)
     if settings.calibration.sets:
         tables["calibration"] = belief_counts(settings, point)
         if point.calibration is not None and settings.inference.exact_ends:

@@ -124,6 +124,7 @@ def test_the_temperature_is_told_on_demand(recorded: Path) -> None:
     assert "(the paths look" in " ".join(done.stdout.split())
     answer = json.loads((saved(recorded) / "answer.json").read_text())
     estimate = answer["temperature_estimate"]
+    assert answer["sets"] is None
     assert estimate["lower"] <= estimate["temperature"] <= estimate["upper"]
 
 
@@ -138,6 +139,28 @@ def test_soft_or_hard_is_told_on_demand(recorded: Path) -> None:
     refused = infer(recorded, *coarse, "soft=2", "transition.samples=200")
     assert refused.returncode == 2
     assert "soft: 2, but a weight needs every single move, and 36000000 are more" in refused.stderr
+
+
+@pytest.mark.parametrize("largest", [2, 5])
+def test_a_belief_over_sets_on_demand(recorded: Path, largest: int) -> None:
+    """Pairs of a hundred hypotheses exactly, and sets of up to five from a sample, since with rule
+    breaking no violation excludes any."""
+    words = ["demonstrations=recorded", "grid=100", "dt=0.5", f"inference.sets.largest={largest}"]
+    words += ["inference.rule_breaking=0.05", "inference.sets.steps=40"]
+    done = infer(recorded, *words)
+    assert done.returncode == 0, done.stderr
+    sets = json.loads((saved(recorded) / "answer.json").read_text())["sets"]
+    said = " ".join(done.stdout.split())
+    assert "forbidden, alone or with others" in said
+    assert sum(sets["sizes"]) == pytest.approx(1)
+    assert 2 <= len(sets["sizes"]) <= largest + 1
+    mean = sum(size * share for size, share in enumerate(sets["sizes"]))
+    assert sum(sets["marginals"].values()) == pytest.approx(mean)
+    assert sets["sizes"][0] == pytest.approx(sets["none"])
+    assert (sets["sampled"] is None) == (largest == 2)
+    if sets["sampled"] is not None:
+        assert sets["sampled"]["effective_samples"] > 1
+        assert "chains" in said
 
 
 def test_durations_that_dt_does_not_divide(recorded: Path) -> None:

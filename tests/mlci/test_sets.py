@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from scipy import sparse
+from scipy.special import gammaln
 from toy_tables import random_table, trajectories
 
 from mlci.demonstrations import Demonstration
@@ -278,6 +279,10 @@ def test_a_geometric_prior_and_neighbours() -> None:
     three = np.array([True, True, True, False])
     assert prior.log(three) == pytest.approx(np.log(0.6 / 7 / 4) + 4.0)
     assert prior.log_beside(np.array([True, False, True, False]))[1] == prior.log(three)
+    many = SetPrior.geometric(0.5, 0.99, 100)  # there are 1e29 sets of 50
+    half = np.arange(100) < 50
+    logs = gammaln(101) - 2 * gammaln(51)
+    assert many.log(half) == pytest.approx(np.log(many.sizes[50]) - logs)
     assert prior.log_beside(three).tolist() == [prior.log(three)] * 3 + [-np.inf]
 
 

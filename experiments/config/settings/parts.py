@@ -184,6 +184,30 @@ class SafetySettings:
 
 
 @dataclass(frozen=True, config=STRICT)
+class SetSettings:
+    """Belief over sets of hypotheses, beside the ranking of each alone."""
+
+    largest: Annotated[
+        CountOrNone,
+        about(
+            "hypotheses that may be forbidden at once, 2 for pairs; 0 asks nothing of sets. More "
+            "than are enumerated (any set of 12, or all pairs) are sampled by Markov chains"
+        ),
+    ]
+    further: Annotated[
+        Probability,
+        about("factor of the prior for each further hypothesis of a set, after the first"),
+    ]
+    adjacency: Annotated[
+        NotNegative,
+        about("how much more probable a set is for each pair of neighbours in it", "nat"),
+    ]
+    steps: Annotated[
+        Count, Field(ge=4), about("moves of each of four chains, where sets are sampled")
+    ]
+
+
+@dataclass(frozen=True, config=STRICT)
 class InferenceSettings:
     """What is believed before any demonstration, and how much each of them says."""
 
@@ -215,6 +239,7 @@ class InferenceSettings:
             "makes them most likely"
         ),
     ]
+    sets: SetSettings
 
     def rates(self, *, calibrated: bool) -> Rates:
         """The rates; that of rule breaking is 0 where it is still to be estimated."""
