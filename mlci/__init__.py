@@ -32,6 +32,8 @@ from typing import TYPE_CHECKING, Any
 from mlci.balls import Ball
 from mlci.calibration import Calibration, calibrate
 from mlci.causal_entropy import CausalEntropy
+from mlci.control_inference import ControlInference, infer_controls
+from mlci.control_ranges import ControlRanges
 from mlci.crossings import Crossing
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
@@ -83,6 +85,8 @@ __all__ = [
     "Box",
     "Calibration",
     "CausalEntropy",
+    "ControlInference",
+    "ControlRanges",
     "Crossing",
     "Demonstration",
     "Diagnosis",
@@ -131,6 +135,7 @@ __all__ = [
     "estimate_weights",
     "explore",
     "infer",
+    "infer_controls",
     "infer_sets",
     "infer_table",
     "infer_until_settled",

@@ -72,7 +72,7 @@ class Answer:
         of_rules = f"{inference.rates.rule_breaking:g}" if breaking is None else f"{breaking}"
         return [
             "at most one region is forbidden",
-            f"prior of none {inference.prior_none:g}, the rest shared equally",
+            f"prior of none {inference.prior_none:g}, {_shared(inference.size_prior)}",
             f"model error {inference.rates.model_error:g}"
             if inference.calibration is None
             else "evidence calibrated as if people moved like the simulated demonstrator",
@@ -251,6 +251,12 @@ def cut_by(grid: Grid, regions: Regions) -> Bools:
         if size < of_hull * (1 - _SAME_SIDE):  # a side that is not along the axes
             cut[i] = np.isfinite(regions.lower[i])
     return cut
+
+
+def _shared(size_prior: float) -> str:
+    """How the prior goes to regions."""
+    power = f"by size to the power of {-size_prior:g}" if size_prior else "equally"
+    return f"the rest shared {power}"
 
 
 def _finite(number: float) -> float | None:

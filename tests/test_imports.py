@@ -99,6 +99,8 @@ MLCI = {
     "mlci.rank_errors": "mlci.preparation",
     "mlci.calibration": "mlci.forecast_scores mlci.demonstrator mlci.preparation",
     "mlci.inverse_dynamics": "mlci.demonstrations mlci.simulate",
+    "mlci.control_ranges": "mlci.inverse_dynamics",
+    "mlci.control_inference": "mlci.control_ranges mlci.maxent mlci.evidence",
     "mlci.temperature": "mlci.inference mlci.inverse_dynamics mlci.maxent",
     "mlci.time_inside": "mlci.crossings mlci.tabular",
     "mlci.soft": "mlci.maxent mlci.time_inside",

@@ -1,0 +1,153 @@
+"""Ranges of controls: what somebody may be unable, or unwilling, to apply, such as u > 1.
+
+A range is an open box of controls, infinite at the ends that do not count: a control on its border
+is not in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mlci.demonstrations import Demonstration
+from mlci.inverse_dynamics import controls_along
+from mlci.spaces import Bools, Box, Floats
+from mlci.systems import System
+
+
+@dataclass(frozen=True, eq=False)
+class ControlRanges:
+    """C ranges of m controls; they may overlap.
+
+    Attributes:
+        lower: (C, m) lower ends, -inf where there is none.
+        upper: (C, m) upper ends, +inf where there is none.
+        names: (C,) name of each, all different; by default its number, from "0".
+
+    Raises:
+        ValueError: ends of the wrong shape, an empty range, one that is everything, or names that
+            are too few, too many or not different.
+    """
+
+    lower: Floats
+    upper: Floats
+    names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
+        if lower.ndim != 2 or lower.shape != upper.shape:
+            raise ValueError(
+                f"control ranges need ends of one shape (C, m), not {lower.shape} and {upper.shape}"
+            )
+        bad = ~np.all(lower < upper, axis=1) | np.all(np.isinf(lower) & np.isinf(upper), axis=1)
+        if bad.any():
+            first = int(np.argmax(bad))
+            raise ValueError(
+                f"control range {first} needs lower < upper and a finite end: "
+                f"{lower[first].tolist()} to {upper[first].tolist()}"
+            )
+        names = tuple(self.names) or tuple(map(str, range(len(lower))))
+        if len(names) != len(lower) or len(set(names)) < len(names):
+            raise ValueError(f"{len(lower)} ranges need as many different names, not {names}")
+        object.__setattr__(self, "lower", lower)
+        object.__setattr__(self, "upper", upper)
+        object.__setattr__(self, "names", names)
+
+    @classmethod
+    def beyond(cls, system: System, shares: Sequence[float]) -> ControlRanges:
+        """For each control, all above and all below each share of its range, in this order.
+
+        Args:
+            system: gives names of dimensions, and the control box.
+            shares: in (0, 1): of the way from the middle of a control's range to its end.
+
+        Raises:
+            ValueError: a share outside (0, 1).
+        """
+        if not all(0 < share < 1 for share in shares):
+            raise ValueError(f"shares of a control's range lie in (0, 1), not {list(shares)}")
+        box, lower, upper, names = system.control_box, [], [], []
+        middle, half = (box.lower + box.upper) / 2, box.widths / 2
+        for k in range(box.dimension):
+            for sign, word in ((1.0, "above"), (-1.0, "below")):
+                for share in shares:
+                    end = middle[k] + sign * share * half[k]
+                    free = np.full((2, box.dimension), [[-np.inf], [np.inf]])
+                    free[0 if sign > 0 else 1, k] = end
+                    lower.append(free[0])
+                    upper.append(free[1])
+                    names.append(f"control {k} {word} {end:.6g}")
+        m = box.dimension
+        return cls(np.reshape(lower, (-1, m)), np.reshape(upper, (-1, m)), tuple(names))
+
+    def __len__(self) -> int:
+        return len(self.lower)
+
+    def holds(self, controls: ArrayLike, tolerance: Floats | float = 0.0) -> Bools:
+        """Whether controls (..., m) lie in each range (..., C), by more than a tolerance (m,)."""
+        controls = np.asarray(controls, dtype=float)[..., None, :]
+        inside = (controls > self.lower + tolerance) & (controls < self.upper - tolerance)
+        return np.asarray(np.all(inside, axis=-1))
+
+    def left_of(self, box: Box, index: int) -> Box:
+        """What range `index` leaves of a control box: the limit of who keeps out of it.
+
+        Raises:
+            ValueError: what it leaves is no box, or nothing.
+        """
+        first = np.maximum(self.lower[index], box.lower)
+        last = np.minimum(self.upper[index], box.upper)
+        cut = np.flatnonzero((first > box.lower) | (last < box.upper))
+        at_end = (first == box.lower) | (last == box.upper)
+        if len(cut) == 1 and at_end[cut[0]] and np.all(first < last):
+            return Box(
+                np.where((first == box.lower) & (last < box.upper), last, box.lower),
+                np.where(first > box.lower, first, box.upper),
+            )
+        raise ValueError(
+            f"range {self.names[index]} leaves no box of the controls {box}: it must cut off one "
+            "end of one control"
+        )
+
+    def applied_by(
+        self,
+        system: System,
+        demonstration: Demonstration,
+        window: float,
+        tolerance: Floats | float = 0.0,
+    ) -> Bools:
+        """(C,) which ranges a demonstration applies controls of.
+
+        Its recorded controls count, or else those of `mlci.inverse_dynamics.controls_along`; means
+        over windows of time, as noise of the states makes spikes of controls.
+
+        Args:
+            system: the dynamics.
+            demonstration: the path.
+            window: length of the windows [s], such as the time step of a tabular model.
+            tolerance: how far into a range a mean must be (m,), in the units of the controls.
+
+        Raises:
+            ValueError: a window that is not positive, or longer than the demonstration.
+        """
+        times, controls = demonstration.times, demonstration.controls
+        if not 0 < window <= times[-1] * (1 + 1e-9):
+            raise ValueError(
+                f"a window must be positive and at most {times[-1]:g} s, as long as the "
+                f"demonstration, not {window:g} s"
+            )
+        if controls is None:
+            controls = controls_along(system, demonstration.states, times)
+        effects = np.vstack([np.zeros(controls.shape[1]), controls * np.diff(times)[:, None]])
+        total = np.cumsum(effects, axis=0)
+        # A mean is linear in when its window begins, but where an end passes a sample.
+        begins = np.union1d(times, times - window)
+        begins = begins[(begins >= 0) & (begins <= times[-1] - window * (1 - 1e-9))]
+        until, since = (
+            np.column_stack([np.interp(at, times, column) for column in total.T])
+            for at in (begins + window, begins)
+        )
+        return np.asarray(np.any(self.holds((until - since) / window, tolerance), axis=0))

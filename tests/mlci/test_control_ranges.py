@@ -1,0 +1,181 @@
+"""Ranges of controls: all trajectories enumerated, controls recorded and reconstructed, limits."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from mlci.control_inference import control_avoidance, infer_controls, without
+from mlci.control_ranges import ControlRanges
+from mlci.demonstrations import Demonstration, Task
+from mlci.demonstrator import demonstrate, sample_trials
+from mlci.evidence import Rates
+from mlci.grids import Grid
+from mlci.regions import Regions
+from mlci.simulate import rollout
+from mlci.spaces import Box, StateSpace
+from mlci.systems import DoubleIntegrator, FunctionSystem
+from mlci.tabular import action_grid, discretize
+
+LINE = StateSpace(Box([0.0], [5.0]), [False], ("x",))
+WALKER = FunctionSystem(lambda x, u: (u[..., 0],), LINE, Box([-1.0], [1.0]))
+NO_REGIONS = Regions.from_boxes(LINE, [])
+FAST = ControlRanges(
+    [[0.5], [-np.inf], [-np.inf]], [[np.inf], [-0.5], [0.5]], ("up", "down", "slow")
+)
+CART = DoubleIntegrator()
+
+
+def test_alpha_is_the_share_of_trajectories_that_take_no_such_action() -> None:
+    actions = np.array([[-1.0], [0.0], [1.0]])
+    model = discretize(WALKER, Grid(LINE, (5,)), actions, 1.0, NO_REGIONS)
+    task = Task(np.array([2.5]), Box([3.0], [4.0]), 4.0)
+    held = FAST.holds(actions)
+    weights, avoiding = 0.0, np.zeros(3)
+    for sequence in itertools.product(range(3), repeat=4):
+        positions = 2.5 + np.cumsum(actions[list(sequence), 0])
+        if np.all((positions > 0) & (positions < 5)) and 3 < positions[-1] < 4:
+            weight = np.exp(-np.sum(actions[list(sequence)] ** 2))
+            weights += weight
+            avoiding += weight * ~np.any(held[list(sequence)], axis=0)
+    for exact_ends in (False, True):
+        alpha = control_avoidance(model, [task], held, exact_ends=exact_ends)
+        # Without "up" nobody gets up; "slow" holds all that does not.
+        np.testing.assert_allclose(alpha[0], avoiding / weights, atol=1e-12)
+    assert alpha[0, 0] == 0
+    assert 0 < alpha[0, 1] < 1
+
+
+def test_what_is_left_moves_as_before() -> None:
+    actions = action_grid(CART, 5)
+    regions = Regions.from_grid(CART.space, (3, 3))
+    model = discretize(CART, Grid(CART.space, (6, 6)), actions, 0.5, regions, samples=2)
+    mask = np.array([True, False, False, True, False])
+    smaller = without(model, mask)
+    moves = np.flatnonzero(~mask[model.action])
+    cells = np.arange(36)
+    every, some = model.moves_of(cells), smaller.moves_of(cells)
+    np.testing.assert_array_equal(some.successor, every.successor[:, moves])
+    rows = every.crosses.toarray().reshape(36, model.moves, -1)[:, moves]
+    np.testing.assert_array_equal(some.crosses.toarray().reshape(36, len(moves), -1), rows)
+    assert smaller.moves == len(moves)
+
+
+def cart_path(controls: list[float], hold: int = 50, dt: float = 0.01) -> Demonstration:
+    """The cart from rest under controls that are each held for half a second."""
+    applied = np.repeat(controls, hold)[:, None]
+    states = rollout(CART, [0.0, 0.0], applied, dt)
+    return Demonstration(
+        Task(states[0], Box.point(states[-1]), len(applied) * dt),
+        states,
+        applied,
+        np.arange(len(states)) * dt,
+    )
+
+
+RANGES = ControlRanges.beyond(CART, [0.25, 0.5, 0.75])
+LIMIT = float(CART.control_box.upper[0])
+
+
+def test_recorded_and_reconstructed_controls_tell_the_same() -> None:
+    recorded = cart_path([0.6 * LIMIT, -0.3 * LIMIT, 0.1 * LIMIT])
+    assert RANGES.applied_by(CART, recorded, 0.25).tolist() == [
+        True,
+        True,
+        False,
+        True,
+        False,
+        False,
+    ]
+    blind = Demonstration(recorded.task, recorded.states, None, recorded.times)
+    np.testing.assert_array_equal(
+        RANGES.applied_by(CART, blind, 0.25, 1e-6), RANGES.applied_by(CART, recorded, 0.25)
+    )
+
+
+def test_noise_is_averaged_and_borders_tolerated() -> None:
+    path = cart_path([0.5 * LIMIT, -0.5 * LIMIT])
+    at_most_half = [True, False, False, True, False, False]
+    assert RANGES.applied_by(CART, path, 0.25).tolist() == at_most_half
+    rng = np.random.default_rng(0)
+    shaky = path.states + rng.normal(0, [2e-4, 3e-3], path.states.shape)
+    shaky[[0, -1]] = path.states[[0, -1]]
+    noisy = Demonstration(path.task, shaky, None, path.times)
+    assert RANGES.applied_by(CART, noisy, 0.01).all()  # spikes of single samples
+    assert RANGES.applied_by(CART, noisy, 0.25, 0.1 * LIMIT).tolist() == at_most_half
+    burst = cart_path([0.0] * 10 + [0.9 * LIMIT] + [0.0] * 10, hold=5)
+    assert RANGES.applied_by(CART, burst, 0.05)[2]
+    assert not RANGES.applied_by(CART, burst, 0.5).any()
+
+
+def test_limit_is_what_a_range_leaves() -> None:
+    box = Box([-1.0, -2.0], [1.0, 2.0])
+    free = np.inf
+    ranges = ControlRanges(
+        [[0.5, -free], [-free, -free], [-0.5, -free], [0.5, 0.5], [2.0, -free], [-2.0, -free]],
+        [[free, free], [free, -1.0], [0.5, free], [free, free], [free, free], [free, free]],
+    )
+    upper, lower = (ranges.left_of(box, i) for i in range(2))
+    assert (upper.lower.tolist(), upper.upper.tolist()) == ([-1, -2], [0.5, 2])
+    assert (lower.lower.tolist(), lower.upper.tolist()) == ([-1, -1], [1, 2])
+    for i in range(2, 6):
+        with pytest.raises(ValueError, match="must cut off one end of one control"):
+            ranges.left_of(box, i)
+
+
+def test_a_joint_that_will_not_push_is_found() -> None:
+    ranges = ControlRanges.beyond(CART, [0.5])
+    limit = ranges.left_of(CART.control_box, 0)
+    trials = sample_trials(
+        CART, None, Box([-2, -0.5], [2, 0.5]), trials=16, seed=1, horizon=3.0, dt=0.05, restarts=1
+    )
+    attempts = demonstrate(CART, trials, None, None, dt=0.05, limit=limit)
+    paths = [each.demonstration for each in attempts if each.outcome == "kept"]
+    assert len(paths) >= 6
+    regions = Regions.from_boxes(CART.space, [])
+    model = discretize(CART, Grid(CART.space, (24, 16)), action_grid(CART, 9), 0.25, regions)
+    inference = infer_controls(model, paths, ranges, tolerance=1e-6)
+    assert not inference.applied[:, 0].any()
+    assert inference.ranking.order[0] == 0
+    assert inference.ranking.gain[0] > 0
+    table = inference.to_frame()
+    assert table["range"][0] == ranges.names[0]
+    assert table["applied_by"][0] == 0
+
+
+def test_posterior_is_that_of_equation_5() -> None:
+    path = cart_path([0.3 * LIMIT, -0.3 * LIMIT, 0.0, 0.0])
+    regions = Regions.from_boxes(CART.space, [])
+    model = discretize(CART, Grid(CART.space, (24, 16)), action_grid(CART, 9), 0.25, regions)
+    inference = infer_controls(model, [path], RANGES, rates=Rates(0.0), prior_none=0.4)
+    likelihood = np.where(inference.applied[0], 0.0, 1 / inference.avoidance[0])
+    weight = np.append(0.1 * likelihood, 0.4)
+    np.testing.assert_allclose(inference.ranking.posterior, (weight / weight.sum())[:-1], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ControlRanges([1.0], [2.0]), r"ends of one shape \(C, m\)"),
+        (lambda: ControlRanges([[2.0]], [[1.0]]), "range 0 needs lower < upper and a finite end"),
+        (lambda: ControlRanges([[-np.inf]], [[np.inf]]), "a finite end"),
+        (lambda: ControlRanges([[0.0]], [[1.0]], ("a", "b")), "1 ranges need as many"),
+        (lambda: ControlRanges.beyond(CART, [1.0]), r"lie in \(0, 1\)"),
+        (lambda: RANGES.applied_by(CART, cart_path([0.0]), 2.0), "at most 0.5 s, as long as"),
+    ],
+)
+def test_impossible_ranges_are_refused(make, message) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_ranges_that_a_model_cannot_tell_are_refused() -> None:
+    regions = Regions.from_boxes(CART.space, [])
+    model = discretize(CART, Grid(CART.space, (6, 6)), action_grid(CART, 3), 0.5, regions)
+    narrow = ControlRanges([[0.2 * LIMIT]], [[0.4 * LIMIT]])
+    with pytest.raises(ValueError, match="range 0 holds none of the model's 3 actions"):
+        infer_controls(model, [], narrow)
+    with pytest.raises(ValueError, match="ranges of 2 controls do not fit actions of 1"):
+        infer_controls(model, [], ControlRanges([[0.0, 0.0]], [[1.0, 1.0]]))
