@@ -9,12 +9,17 @@ import pandas as pd
 
 from experiments.terminal import WIDTH, entry, table_lines, words
 from mlci.answers import Answer, listed
+from mlci.demonstrations import Task
 from mlci.diagnosis import Diagnosis
 from mlci.inference import Inference
 from mlci.sets import SetPosterior
 from mlci.spaces import Box, StateSpace
 
 _AREAS, _CARRIERS, _MARGINALS = 3, 4, 5  # that are printed
+NEXT_ASSUMED = (
+    "as far as at most one region is forbidden, and people move like the tabular model; to tell "
+    "something is to move a tenth of the probability"
+)
 
 
 def trial_lines(counts: Mapping[str, int]) -> list[str]:
@@ -79,6 +84,7 @@ def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) 
     yield from entry("", _left_out_words(answer))
     for estimate in answer.weights:
         yield from entry("soft or hard?", f"region {estimate.region} {estimate}")
+    yield from _next_lines(answer)
     for warning in answer.warnings:
         yield from entry("warning", warning)
 
@@ -113,6 +119,22 @@ def refutation_lines(inference: Inference) -> list[str]:
         note = [] if reachable else ["(goal unreachable: adds no gain)"]
         lines += entry("", " ".join([name, *numbers, *note]), hang=2)
     return lines
+
+
+def _next_lines(answer: Answer) -> Iterator[str]:
+    """What to record next, and what that takes for granted."""
+    if not answer.next_tasks:
+        return
+    title, space = "record next", answer.inference.hypotheses.space
+    for each in answer.next_tasks:
+        yield from entry(
+            title,
+            f"{each.name}: {task_words(each.task, space)}: {each.information:.3f} nat expected, "
+            f"tells something with probability {probability(each.chance)}",
+            hang=2,
+        )
+        title = ""
+    yield from entry("", NEXT_ASSUMED)
 
 
 def _first_words(answer: Answer) -> str:
@@ -199,6 +221,12 @@ def gain_words(gain: float) -> str:
     return "unavoidable" if gain == np.inf else f"{gain:.3f}"
 
 
+def task_words(task: Task, space: StateSpace) -> str:
+    """Start, goal and duration of a task, with units."""
+    start, goal = bounds(Box.point(task.start), space), bounds(task.goal, space)
+    return f"from {start} to {goal} in {task.horizon:.4g} s"
+
+
 def bounds(box: Box, space: StateSpace) -> str:
     """Where a box is, in words."""
     sides = [
@@ -213,7 +241,8 @@ def _side(box: Box, d: int) -> str:
     """The ends of a box in a dimension."""
     if not np.isfinite(box.lower[d]):
         return "any"
-    return f"{box.lower[d]:.4g} to {box.upper[d]:.4g}"
+    low, high = f"{box.lower[d]:.4g}", f"{box.upper[d]:.4g}"
+    return low if box.lower[d] == box.upper[d] else f"{low} to {high}"
 
 
 def measure_lines(summary: pd.Series, ranks: pd.DataFrame, top: int) -> Iterator[str]:

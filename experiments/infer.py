@@ -34,6 +34,7 @@ from experiments.point.recorded import (
     recorded_weights,
     together,
 )
+from experiments.point.recorded_next import recorded_next_tasks
 from experiments.point.recorded_tables import demonstration_tables, path_table
 from experiments.point.sets import set_belief, set_record
 from experiments.point.stages import discretized_model
@@ -187,6 +188,7 @@ def _answer(
         temperature=temperature,
         doubts=doubts,
         weights=recorded_weights(settings, model, demonstrations, inference),
+        next_tasks=recorded_next_tasks(settings, model, demonstrations, inference),
     )
 
 

@@ -15,6 +15,7 @@ from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.membership import volume_share
 from mlci.misfit import SAMPLES, Misfit, misfit
+from mlci.next_task import NextTask
 from mlci.regions import Regions
 from mlci.shapes import Cuboid
 from mlci.size_bias import SizeBias, size_bias
@@ -45,6 +46,7 @@ class Answer:
         temperature_estimate: the temperature that the demonstrations look like, if it is known.
         doubts: about the recordings themselves, such as `mlci.recordings.plausibility.summary`.
         weights: soft or hard? What `mlci.soft_weight.estimate_weights` made of some regions.
+        next_tasks: what to record next, as `mlci.next_task.next_tasks` chose it.
     """
 
     inference: Inference
@@ -57,6 +59,7 @@ class Answer:
     temperature_estimate: TemperatureEstimate | None = None
     doubts: tuple[str, ...] = ()
     weights: tuple[WeightEstimate, ...] = ()
+    next_tasks: tuple[NextTask, ...] = ()
 
     @cached_property
     def size_bias(self) -> SizeBias | None:
@@ -130,6 +133,7 @@ class Answer:
             else self.temperature_estimate.record(),
             "weights": [estimate.record() for estimate in self.weights],
             "size_bias": None if self.size_bias is None else self.size_bias.record(),
+            "next_tasks": [each.record(space) for each in self.next_tasks],
             "unseen": [names[i] for i in self.unseen],
             "warnings": self.warnings,
         }
@@ -179,6 +183,7 @@ def answer(
     temperature: TemperatureEstimate | None = None,
     doubts: Sequence[str] = (),
     weights: Sequence[WeightEstimate] = (),
+    next_tasks: Sequence[NextTask] = (),
 ) -> Answer:
     """Look at an inference from all sides.
 
@@ -193,6 +198,7 @@ def answer(
         temperature: what `mlci.temperature.estimate_temperature` made of the demonstrations.
         doubts: about the recordings themselves.
         weights: what `mlci.soft_weight.estimate_weights` made of the demonstrations.
+        next_tasks: what `mlci.next_task.next_tasks` says is to be recorded next.
     """
     distributions = (
         TrajectoryDistribution.of_task(
@@ -217,6 +223,7 @@ def answer(
         temperature_estimate=temperature,
         doubts=tuple(doubts),
         weights=tuple(weights),
+        next_tasks=tuple(next_tasks),
     )
 
 

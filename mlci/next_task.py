@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy  # loads scipy.special when it is first used
 from numpy.typing import ArrayLike
 
+from mlci.calibration import certain_by_ends
 from mlci.demonstrations import Task
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
@@ -37,6 +39,7 @@ class NextTask:
     Attributes:
         task: the task.
         number: which of the candidates it is.
+        name: what the candidate is called.
         information: expected drop of the posterior's entropy by a demonstration of it [nat], beyond
             that by the tasks before it in a batch.
         error: standard error of `information` by its trajectories, for a first task [nat].
@@ -45,9 +48,30 @@ class NextTask:
 
     task: Task
     number: int
+    name: str
     information: float
     error: float
     chance: float
+
+    def record(self, space: StateSpace) -> dict[str, Any]:
+        """The same for programs, fit for JSON; a side of a goal that is free is None."""
+        goal = self.task.goal
+        lower, upper = (
+            {
+                name: float(end) if np.isfinite(end) else None
+                for name, end in zip(space.names, side, strict=True)
+            }
+            for side in (goal.lower, goal.upper)
+        )
+        return {
+            "name": self.name,
+            "start": dict(zip(space.names, self.task.start.tolist(), strict=True)),
+            "goal": {"lower": lower, "upper": upper},
+            "horizon": self.task.horizon,
+            "information": self.information,
+            "error": self.error,
+            "chance": self.chance,
+        }
 
 
 def simulate_tasks(
@@ -63,6 +87,9 @@ def simulate_tasks(
     progress: Progress | None = None,
 ) -> list[TaskOutcomes | None]:
     """What demonstrations of each task may show; None where the tabular model cannot do it.
+
+    A region that holds a task's start or goal counts for nothing there: whoever keeps out of it
+    would not do the task, and nobody should be asked to.
 
     Args:
         model: the tabular model.
@@ -89,7 +116,8 @@ def simulate_tasks(
         )
         of_task = tabular_forecast(distribution)
         if of_task.possible:
-            alpha, decided = of_task.avoidance[None, mask], of_task.decided[None, mask]
+            alpha = of_task.avoidance[None, mask]
+            decided = of_task.decided[None, mask] | certain_by_ends(inference.hypotheses, [task])
             forecast = inference.forecast_of(alpha, decided)[0]
             violated = as_forecast(
                 sample_crossings(distribution, samples, rng)[:, mask],
@@ -111,6 +139,7 @@ def next_tasks(
     tasks: Sequence[Task],
     *,
     count: int = 3,
+    names: Sequence[str] = (),
     hypotheses: ArrayLike | None = None,
     samples: int = SAMPLES,
     seed: int = 0,
@@ -129,6 +158,7 @@ def next_tasks(
         tasks: the candidates; those that the model cannot do, or that are nearly one of the chosen,
             are passed over.
         count: of tasks, at most.
+        names: of the candidates; their numbers by default.
         hypotheses: as of `simulate_tasks`, as are the others.
         samples: likewise.
         seed: likewise.
@@ -162,7 +192,8 @@ def next_tasks(
         best = max(expected, key=expected.__getitem__)
         task, of_best = tasks[best], outcomes[best]
         information, error, chance = expected[best], of_best.error(belief), of_best.chance(belief)
-        chosen.append(NextTask(task, best, information, error, chance))
+        name = names[best] if names else str(best)
+        chosen.append(NextTask(task, best, name, information, error, chance))
         futures = np.repeat(beliefs, _FUTURES, axis=0) if len(beliefs) == 1 else beliefs
         beliefs = of_best.learnt(futures, rng)
         space = model.grid.space

@@ -109,10 +109,10 @@ MLCI = {
     "mlci.size_bias": "mlci.inference",
     "mlci.support": "mlci.inference",
     "mlci.misfit": "mlci.maxent",
-    "mlci.answers": "mlci.misfit mlci.size_bias mlci.soft_weight mlci.support mlci.temperature",
+    "mlci.answers": "mlci.next_task mlci.size_bias mlci.soft_weight mlci.support mlci.temperature",
     "mlci.metrics": "mlci.evidence",
     "mlci.task_outcomes": "mlci.evidence",
-    "mlci.next_task": "mlci.inference mlci.misfit mlci.models mlci.task_outcomes",
+    "mlci.next_task": "mlci.calibration mlci.misfit mlci.models mlci.task_outcomes",
 }
 # What mlci may import of others: no configs, no formats but those of recordings, no figures.
 MATHEMATICS = "contourpy numpy scipy numba pandas pyarrow joblib pint openpyxl ezc3d"

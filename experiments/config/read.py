@@ -110,11 +110,15 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
         ConfigError: listing every problem.
     """
     # How demonstrations are made, which a system brings, plays no part.
-    table = tree.get("tasks")
+    tasks, chosen = tree.get("tasks"), tree.get("next_tasks")
     used = _without(tree, ("tasks", "safety", "truth"))
-    settings = checked(
-        RecordedSettings, {**used, "tasks": None if isinstance(table, Mapping) else table}
-    )
+    used["tasks"] = None if isinstance(tasks, Mapping) else tasks
+    # But what to record next is drawn from the system's box, unless another one is given.
+    if isinstance(chosen, Mapping):
+        box = chosen.get("box") or (tasks if isinstance(tasks, Mapping) else None)
+        if isinstance(box, Mapping):
+            used["next_tasks"] = {**chosen, "box": {"goal": None, **_without(box, ("crossing",))}}
+    settings = checked(RecordedSettings, used)
     _refuse(shape_problems(settings), recorded_shape_problems(settings))
     _refuse(size_problems(settings), soft_problems(settings))
     return settings

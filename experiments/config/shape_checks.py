@@ -19,7 +19,7 @@ from experiments.config.settings import (
     Settings,
     ShapeList,
     SubjectSettings,
-    TaskSettings,
+    TaskBoxSettings,
 )
 from mlci.shapes import as_shape, checked_hull
 from mlci.spaces import StateSpace
@@ -35,7 +35,7 @@ def point_shape_problems(settings: Settings) -> Iterator[str]:
     """A safe set's grid, tasks or a truth that do not match the system."""
     space = settings.model.space
     yield from _length_problems("safety.shape", settings.safety.shape, space)
-    yield from _task_region_problems(settings.tasks, space)
+    yield from _task_region_problems("tasks", settings.tasks, space)
     yield from _listed_problems("truth", settings.truth, space)
     yield from _reality_problems(settings)
 
@@ -47,7 +47,7 @@ def advice_shape_problems(settings: AdviceSettings) -> Iterator[str]:
     for i, shape in enumerate(settings.grids or ()):
         yield from _length_problems(f"grids[{i}]", shape, space)
     yield from _subject_problems(settings)
-    yield from _task_region_problems(settings.tasks, space)
+    yield from _task_region_problems("tasks", settings.tasks, space)
 
 
 def recorded_shape_problems(settings: RecordedSettings) -> Iterator[str]:
@@ -66,6 +66,8 @@ def recorded_shape_problems(settings: RecordedSettings) -> Iterator[str]:
         yield from _length_problems("start", settings.start, space)
     if settings.goal is not None:
         yield from _region_problems("goal", settings.goal, space, point=True)
+    if settings.next_tasks.box is not None:
+        yield from _task_region_problems("next_tasks.box", settings.next_tasks.box, space)
     for name, of in (settings.derive or {}).items():
         if name == of or not {name, of} <= set(space.names):
             yield (
@@ -147,11 +149,11 @@ def _offset_problems(offset: tuple[float, ...] | None, space: StateSpace) -> Ite
             yield f"grid.offset: {list(offset)} shifts {name}, which has ends; give it 0"
 
 
-def _task_region_problems(tasks: TaskSettings, space: StateSpace) -> Iterator[str]:
+def _task_region_problems(key: str, tasks: TaskBoxSettings, space: StateSpace) -> Iterator[str]:
     """A box of tasks, or the reach of their goals, that does not fit the state space."""
-    yield from _region_problems("tasks", tasks, space, point=True)
+    yield from _region_problems(key, tasks, space, point=True)
     if tasks.goal is not None:
-        yield from _length_problems("tasks.goal", tasks.goal, space)
+        yield from _length_problems(f"{key}.goal", tasks.goal, space)
 
 
 def _length_problems(key: str, entries: tuple[Any, ...], space: StateSpace) -> Iterator[str]:

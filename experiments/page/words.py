@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.console import bounds
+from experiments.console import NEXT_ASSUMED, bounds, task_words
 from experiments.terminal import words
 from mlci.answers import Answer, listed
 from mlci.regions import Regions
@@ -98,7 +98,8 @@ def next_sentences(answer: Answer) -> list[str]:
     if not len(unseen):
         return [
             "Each region lies on the way of some task that was recorded, so that keeping out of it "
-            "says something. More demonstrations of such tasks make the answer surer."
+            "says something. More demonstrations of such tasks make the answer surer.",
+            *_task_sentences(answer),
         ]
     return [
         f"{len(unseen)} of {len(regions)} regions lie on the way of no task that was recorded "
@@ -106,6 +107,24 @@ def next_sentences(answer: Answer) -> list[str]:
         "likely nor ruled out.",
         "Record tasks whose easiest way leads through them. The nearest to the likeliest region: "
         f"{_places(regions, _by_distance(regions, unseen, answer.support.region))}.",
+        *_task_sentences(answer),
+    ]
+
+
+def _task_sentences(answer: Answer) -> list[str]:
+    """The tasks that promise most, and what that takes for granted."""
+    if not answer.next_tasks:
+        return []
+    space = answer.inference.hypotheses.space
+    return [
+        "Of the tasks that could come next, these are expected to teach most about which region "
+        "is avoided. Of 100 demonstrations so many would move a tenth of the probability or more:",
+        *(
+            f"Task {each.name}, {task_words(each.task, space)}: {of_100(each.chance)} "
+            f"(expected information {each.information:.3f} nat)."
+            for each in answer.next_tasks
+        ),
+        f"That holds {NEXT_ASSUMED.partition(';')[0]}.",
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ import pytest
 from experiments.console import answer_lines, bounds, probability
 from experiments.terminal import entry
 from mlci.answers import Answer
+from mlci.demonstrations import Task
 from mlci.evidence import PAPER, Rates
 from mlci.inference import Inference
 from mlci.misfit import Misfit
+from mlci.next_task import NextTask
 from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 from mlci.support import support
@@ -112,6 +115,17 @@ def said(each: Answer) -> str:
 )  # fmt: skip
 def test_a_probability_is_not_rounded_to_certainty(value: float, words: str) -> None:
     assert probability(value) == words
+
+
+def test_what_to_record_next_is_printed_with_units() -> None:
+    task = Task(np.array([0.5, 0.0]), Box([3.0, -np.inf], [3.5, np.inf]), 5.0)
+    chosen = NextTask(task, 7, "reach", 0.21, 0.01, 0.34)
+    told = replace(answer(PLANE, (2, 2), [[0.5]]), next_tasks=(chosen,))
+    words = " ".join(" ".join(answer_lines(told, 3)).split())
+    assert (
+        "record next reach: from angle 0.5 rad, angular velocity 0 rad/s to angle 3 to 3.5 rad in "
+        "5 s: 0.210 nat expected, tells something with probability 0.340 as far as at most one"
+    ) in words
 
 
 def test_a_box_in_words() -> None:

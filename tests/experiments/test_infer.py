@@ -33,6 +33,7 @@ def infer(folder: Path, *overrides: str) -> subprocess.CompletedProcess[str]:
         command.main,
         f"results={folder / 'results'}",
         "inference.calibrate=false",
+        "next_tasks.candidates=4",
         *overrides,
         folder=folder,
     )
@@ -102,6 +103,12 @@ def test_recorded_demonstrations_are_ranked_and_saved(
     page = (folder / "page.html").read_text()
     assert f"Region {best['hypothesis']:.0f} is the most likely to be avoided" in page
     assert f"page: {folder / 'page.html'}" in done.stdout
+    assert "record next" in done.stdout
+    assert "Of the tasks that could come next" in page
+    answer = json.loads((folder / "answer.json").read_text())
+    informations = [each["information"] for each in answer["next_tasks"]]
+    assert len(informations) == 3
+    assert all(information > 0 for information in informations)
     record = json.loads((folder / "record.json").read_text())
     assert record["config"]["dt"] == 0.5
     assert record["not_used"] == []

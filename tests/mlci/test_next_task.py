@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +15,8 @@ import mlci
 from mlci.demonstrations import Task
 from mlci.evidence import PAPER, Rates
 from mlci.inference import Inference
-from mlci.next_task import entropy, nearly_the_same, next_tasks, plausible, simulate_tasks
+from mlci.next_task import NextTask, entropy, nearly_the_same, next_tasks, plausible, simulate_tasks
+from mlci.regions import Regions
 from mlci.spaces import Bools, Box, Floats, StateSpace
 from mlci.tabular import TabularModel
 
@@ -25,7 +28,13 @@ def toy_world() -> TabularModel:
     rng = np.random.default_rng(7)
     successor = rng.integers(0, 6, size=(6, 3))
     crosses = rng.random((18, REGIONS)) < [0.05, 0.1, 0.15, 0.2]
-    return toy_model(successor, rng.normal(size=(6, 3)), np.ones((6, 3), bool), crosses)
+    return away(toy_model(successor, rng.normal(size=(6, 3)), np.ones((6, 3), bool), crosses))
+
+
+def away(model: TabularModel) -> TabularModel:
+    """The model with its regions moved to where no task begins or ends."""
+    boxes = [Box([0.6], [0.7])] * len(model.regions)
+    return replace(model, regions=Regions.from_boxes(model.grid.space, boxes))
 
 
 def task_to(goal: int) -> Task:
@@ -140,15 +149,17 @@ def test_a_batch_repeats_no_task_and_adds_less_with_each() -> None:
 
 
 def test_tasks_that_the_model_cannot_do_are_passed_over() -> None:
-    model = toy_model(
-        np.array([[1], [0]]), np.zeros((2, 1)), np.ones((2, 1), bool), np.ones((2, 1), bool)
+    model = away(
+        toy_model(
+            np.array([[1], [0]]), np.zeros((2, 1)), np.ones((2, 1), bool), np.ones((2, 1), bool)
+        )
     )
     inference = nothing_seen(model)
     odd = Task(np.array([0.5]), Box.point([0.5]), 3.0)  # after three moves it is in the other cell
     assert next_tasks(model, inference, [odd], exact_ends=False) == []
     even = Task(np.array([0.5]), Box.point([0.5]), 2.0)
-    chosen = next_tasks(model, inference, [odd, even], exact_ends=False)
-    assert [each.number for each in chosen] == [1]
+    chosen = next_tasks(model, inference, [odd, even], names=["odd", "even"], exact_ends=False)
+    assert [each.name for each in chosen] == ["even"]
     with pytest.raises(ValueError, match="at least one trajectory"):
         next_tasks(model, inference, [even], samples=0)
 
@@ -173,3 +184,30 @@ def test_tasks_are_nearly_the_same_the_short_way_round() -> None:
     free = Task(np.array([0.1, 0.0]), Box([5.0, -np.inf], [5.0, np.inf]), 1.0)
     assert nearly_the_same(space, free, free)
     assert not nearly_the_same(space, one, free)
+
+
+def test_nobody_is_asked_to_begin_or_end_in_what_may_be_forbidden() -> None:
+    """All trajectories cross the region; if it holds an end, that a demonstration does says
+    nothing, and else everything."""
+    crossing = toy_model(
+        np.array([[1], [0]]), np.zeros((2, 1)), np.ones((2, 1), bool), np.ones((2, 1), bool)
+    )
+    task = Task(np.array([0.5]), Box.point([0.5]), 2.0)
+    for model, information in ((away(crossing), np.log(2)), (crossing, 0.0)):
+        chosen = next_tasks(model, nothing_seen(model), [task], exact_ends=False)
+        assert chosen[0].information == pytest.approx(information)
+
+
+def test_a_task_as_a_record_for_programs() -> None:
+    space = StateSpace(Box([0.0, -1.0], [10.0, 1.0]), [True, False], ("angle", "speed"))
+    task = Task(np.array([0.1, 0.0]), Box([5.0, -np.inf], [5.5, np.inf]), 2.0)
+    record = json.loads(json.dumps(NextTask(task, 3, "reach", 0.2, 0.01, 0.4).record(space)))
+    assert record == {
+        "name": "reach",
+        "start": {"angle": 0.1, "speed": 0.0},
+        "goal": {"lower": {"angle": 5.0, "speed": None}, "upper": {"angle": 5.5, "speed": None}},
+        "horizon": 2.0,
+        "information": 0.2,
+        "error": 0.01,
+        "chance": 0.4,
+    }

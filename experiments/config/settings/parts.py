@@ -34,8 +34,8 @@ Shape = Annotated[tuple[Count, ...], Field(min_length=1)]
 
 
 @dataclass(frozen=True, config=STRICT)
-class TaskSettings(Region):
-    """Where starts and goals are drawn, and which of the tasks count."""
+class TaskBoxSettings(Region):
+    """Where starts and goals are drawn."""
 
     lower: Annotated[
         tuple[Number | None, ...],
@@ -54,9 +54,6 @@ class TaskSettings(Region):
             "of the state",
         ),
     ]
-    crossing: Annotated[
-        Flag, about("only tasks whose optimum, were there no constraint, would enter the truth")
-    ]
 
     def start_box(self, space: StateSpace) -> Box:
         """Where starts and goals are drawn; a free dimension spans the state space."""
@@ -73,6 +70,15 @@ class TaskSettings(Region):
             return None
         reach = np.array([np.inf if side is None else side for side in self.goal])
         return Box(-reach, reach)
+
+
+@dataclass(frozen=True, config=STRICT)
+class TaskSettings(TaskBoxSettings):
+    """Where starts and goals are drawn, and which of the tasks count."""
+
+    crossing: Annotated[
+        Flag, about("only tasks whose optimum, were there no constraint, would enter the truth")
+    ]
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -20,6 +20,7 @@ from experiments.config.settings.kinds import (
     about,
     one_or_list,
 )
+from experiments.config.settings.parts import TaskBoxSettings
 from experiments.config.settings.point import ModelSettings
 from experiments.config.settings.shapes import Region
 from experiments.config.settings.study import RESULTS
@@ -44,6 +45,31 @@ class CrossingSettings:
     def crossing(self) -> Crossing:
         """The same for the inference."""
         return Crossing(self.depth, self.time)
+
+
+@dataclass(frozen=True, config=STRICT)
+class NextTasksSettings:
+    """What to record next."""
+
+    count: Annotated[CountOrNone, about("tasks to record next that are named; 0 names none")]
+    candidates: Annotated[
+        Count, about("tasks that are drawn, and of which the most informative are named")
+    ]
+    box: Annotated[
+        TaskBoxSettings | None,
+        about(
+            "where these are drawn, as the system's `tasks`: lower, upper and goal; null takes "
+            "those, or the whole state space",
+            "of the state",
+        ),
+    ]
+    file: Annotated[
+        Word | None,
+        about(
+            "table of candidates in place of those that are drawn, with columns as of `tasks`; "
+            "`trial` names them"
+        ),
+    ]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -136,5 +162,6 @@ class RecordedSettings(ModelSettings):
             "weight of each second inside, with its interval; 0 for none"
         ),
     ]
+    next_tasks: NextTasksSettings
     top: Annotated[Count, about("hypotheses that are printed")]
     results: Annotated[Word | None, RESULTS]

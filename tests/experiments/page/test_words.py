@@ -10,7 +10,10 @@ import pytest
 from page_answers import CIRCLE, answer_of
 
 from experiments.page.words import next_sentences, of_100
+from mlci.demonstrations import Task
+from mlci.next_task import NextTask
 from mlci.regions import Regions
+from mlci.spaces import Box
 
 
 @pytest.mark.parametrize(
@@ -41,3 +44,16 @@ def test_the_nearest_regions_come_first_in_shares_of_the_bounds_and_round_the_ci
     )
     named = re.findall(r"region (\d+) \(", next_sentences(answer)[-1])
     assert named == ["3", "7", "17", "12"]
+
+
+def test_the_next_tasks_are_named_with_their_units() -> None:
+    answer, _ = answer_of(Regions.from_grid(CIRCLE, (4, 5)), ["a", "b"])
+    task = Task(np.array([0.5, 0.0]), Box([3.0, -np.inf], [3.5, np.inf]), 5.0)
+    chosen = NextTask(task, 7, "reach", 0.21, 0.01, 0.34)
+    sentences = next_sentences(dataclasses.replace(answer, next_tasks=(chosen,)))
+    assert sentences[:-3] == next_sentences(answer)
+    assert sentences[-2] == (
+        "Task reach, from angle 0.5 rad, speed 0 rad/s to angle 3 to 3.5 rad in 5 s: 34.0 of 100 "
+        "(expected information 0.210 nat)."
+    )
+    assert "at most one region is forbidden" in sentences[-1]
