@@ -139,7 +139,10 @@ def _advance(bucket, low, high):  # type: ignore[no-untyped-def]
     return False
 
 
-@compiled(f"i8(f8[:,:,:], f8[:,:,:], b1[:], i8[::1], {_BOXES}, {_BUCKETS}, {_ROOM}, i8, {_FOUND})")
+@compiled(
+    f"i8(in f8[:,:,:], in f8[:,:,:], in b1[:], "
+    f"i8[::1], {_BOXES}, {_BUCKETS}, {_ROOM}, i8, {_FOUND})"
+)
 def _hits(  # type: ignore[no-untyped-def]
     starts, steps, tested, bounded, corners, buckets, room, done, ends, found, enters, leaves
 ):

@@ -9,6 +9,7 @@ first call, not with mlci.
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from types import FunctionType
@@ -48,7 +49,8 @@ class Compiled:
             function.__qualname__ = self.function.__qualname__
             function.__module__ = self.function.__module__
             compile_it = cast(Any, numba.njit)
-            options = {"nogil": True, "error_model": "numpy"}
+            # A wrapper for C is a sixth of what compiling takes, and nobody calls it.
+            options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
             with _told(function):
                 try:
                     self._machine_code = compile_it(self.signature, cache=True, **options)(function)
@@ -80,7 +82,18 @@ def compiled(signature: str) -> Callable[[Callable[..., Any]], Compiled]:
     """Compile a function of arrays and numbers when it is first called.
 
     Args:
-        signature: numba's, such as "f8[:](f8[:, ::1], i4[:])": one type for each argument, so that
-            nothing is compiled twice. The caller sees to types and layout.
+        signature: numba's, such as "f8[:](in f8[:, ::1], i4[:])": one type for each argument, so
+            that nothing is compiled twice. The caller sees to types and layout. An array that is
+            marked by "in" is not written to, and may be one that cannot be.
     """
-    return lambda function: Compiled(cast(FunctionType, function), signature)
+    types = _IN.sub(_read_only, signature)
+    return lambda function: Compiled(cast(FunctionType, function), types)
+
+
+_IN = re.compile(r"\bin (\w+)\[([^]]*)\]")
+
+
+def _read_only(array: re.Match[str]) -> str:
+    """numba's type of an array, such as "f8[:, ::1]", that need not be writeable."""
+    kind, axes = array.groups()
+    return f"Array({kind}, {axes.count(',') + 1}, '{'C' if '::1' in axes else 'A'}', readonly=True)"

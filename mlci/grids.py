@@ -183,11 +183,7 @@ class Grid:
 _VALUE = -1  # in place of a dimension along which `_multilinear` takes the rise
 
 
-@compiled(
-    "f8[:, ::1](Array(f8, 2, 'A', readonly=True), Array(f8, 2, 'A', readonly=True), "
-    "Array(f8, 1, 'C', readonly=True), Array(f8, 1, 'C', readonly=True), i8[::1], "
-    "Array(b1, 1, 'C', readonly=True), i8)"
-)
+@compiled("f8[:, ::1](in f8[:, :], in f8[:, :], in f8[::1], in f8[::1], i8[::1], in b1[::1], i8)")
 def _multilinear(
     values: Floats,
     states: Floats,

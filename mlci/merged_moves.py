@@ -128,7 +128,8 @@ def _entries(begins: Ints, runs: Ints) -> Ints:
 def _merged(block: SingleMoves) -> MergedMoves:
     """The merged moves of the cells of a block."""
     crosses = block.crosses
-    crosses.sort_indices()
+    if not crosses.has_sorted_indices:
+        crosses = crosses.sorted_indices()
     begins, region = crosses.indptr.astype(np.int64), crosses.indices.astype(np.int32)
     cells, moves = block.successor.shape
     ends, first = np.zeros(cells + 1, dtype=np.int64), np.empty(cells * moves, dtype=np.int64)
@@ -159,7 +160,7 @@ def _alike(begins: Ints, region: Ints, one: int, other: int) -> bool:
 
 
 @compiled(
-    "void(i4[:, ::1], f8[:, ::1], i8[::1], i4[::1], Tuple((f8[::1], i8[::1], i8[::1])), "
+    "void(in i4[:, ::1], in f8[:, ::1], i8[::1], i4[::1], Tuple((f8[::1], i8[::1], i8[::1])), "
     "i8[::1], i8[::1], f8[::1])"
 )
 def _merge(  # type: ignore[no-untyped-def]

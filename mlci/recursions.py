@@ -50,7 +50,7 @@ def backward_pass(
     count = regions - skip
     blocks = max(1, min(count, -(-count * 2 * 8 * states // ALPHA_BYTES)))
     alpha = np.empty(count)
-    for first, end in pairwise(np.linspace(skip, regions, blocks + 1).astype(int).tolist()):
+    for first, end in pairwise(skip + count * block // blocks for block in range(blocks + 1)):
         levels = np.empty((2, states, end - first))  # alpha_t is levels[t % 2]
         levels[last % 2, goal] = 1.0
         for moves, early, late in reversed(legs):
@@ -61,7 +61,7 @@ def backward_pass(
     return log_z, np.minimum(alpha, 1.0)
 
 
-@compiled("void(i8[::1], i4[::1], f8[::1], b1[:, ::1])")
+@compiled("void(in i8[::1], in i4[::1], in f8[::1], b1[:, ::1])")
 def _spread(begins: Ints, successor: Ints, log_weight: Floats, reached: Bools) -> None:
     """Fill in which cells are reached (T+1, S) after each step, from those at step 0."""
     for t in range(reached.shape[0] - 1):
@@ -73,8 +73,8 @@ def _spread(begins: Ints, successor: Ints, log_weight: Floats, reached: Bools) -
 
 
 @compiled(
-    "void(i8[::1], i4[::1], f8[::1], i8[::1], i4[::1], b1[:, ::1], i8, i8, f8[:, ::1], i8, "
-    "f8[:, :, ::1])"
+    "void(in i8[::1], in i4[::1], in f8[::1], in i8[::1], in i4[::1], in b1[:, ::1], i8, i8, "
+    "f8[:, ::1], i8, f8[:, :, ::1])"
 )
 def _step_back(
     begins: Ints,

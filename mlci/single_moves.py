@@ -39,7 +39,8 @@ class SingleMoves:
                 f"successor {shape}, reward {self.reward.shape} and crosses {self.crosses.shape} "
                 "do not agree"
             )
-        object.__setattr__(self, "successor", self.successor.astype(np.int32, copy=False))
+        object.__setattr__(self, "successor", np.ascontiguousarray(self.successor, dtype=np.int32))
+        object.__setattr__(self, "reward", np.ascontiguousarray(self.reward, dtype=float))
 
     @classmethod
     def joined(cls, parts: Sequence[SingleMoves]) -> SingleMoves:

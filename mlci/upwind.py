@@ -34,7 +34,7 @@ def neighbour_rows(grid: Grid) -> Ints:
     return beside
 
 
-@compiled("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+@compiled("void(in f8[::1], in f8[::1], in f8[::1], in f8[::1], in f8[::1], f8[::1], f8[::1])")
 def _one_sided(
     two_before: Floats,
     before: Floats,
@@ -63,7 +63,7 @@ def _one_sided(
         right[i] = to_right - max(min(mean, most), least)
 
 
-@compiled("void(f8[:, ::1], i8, i8[:, :, ::1], b1, f8[::1], f8[:, ::1], f8[:, ::1])")
+@compiled("void(in f8[:, ::1], i8, i8[:, :, ::1], b1, f8[::1], f8[:, ::1], f8[:, ::1])")
 def _row_derivatives(
     values: Floats,
     row: int,
@@ -84,7 +84,7 @@ def _row_derivatives(
     _one_sided(padded[:m], padded[1:-3], here, padded[3:-1], padded[4:], left[last], right[last])
 
 
-@compiled("void(f8[:, ::1], i8[:, :, ::1], b1, f8[:, :, ::1])")
+@compiled("void(in f8[:, ::1], i8[:, :, ::1], b1, f8[:, :, ::1])")
 def mean_derivatives(values: Floats, beside: Ints, wraps: bool, means: Floats) -> None:
     """The means (n, rows, m) of the one-sided derivatives of values (rows, m)."""
     n, rows, m = means.shape

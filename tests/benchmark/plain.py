@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.special import logsumexp
@@ -38,7 +39,7 @@ class World:
     goal: Ints
     steps: int
 
-    @property
+    @cached_property
     def start_cell(self) -> int:
         """The cell of the start."""
         return int(self.grid.index(self.start))
