@@ -34,6 +34,9 @@ def main() -> int:
         help="processes that draw, by default one a core (-1)",
         metavar="N",
     )
+    parser.add_argument(
+        "--again", action="store_true", help="draw also what would stay the same as it is"
+    )
     options = parser.parse_args()
     results = options.results or default_results()
     studies = options.study or sorted(path.parent.name for path in results.glob("*/tables"))
@@ -49,9 +52,11 @@ def main() -> int:
 def _draw(studies: list[Path], options: argparse.Namespace) -> int:
     """Draw the figures of studies; returns the status of the command."""
     is_complete = True
-    for drawing in draw_studies(studies, options.jobs):
-        for path in drawing.images:
+    for drawing in draw_studies(studies, options.jobs, again=options.again):
+        for path in [] if drawing.is_current else drawing.images:
             print(f"drawn: {path}", flush=True)
+        if drawing.is_current:
+            print(f"up to date: {drawing.study / 'figures'}", flush=True)
         if not drawing.images:
             print(f"nothing to draw: {drawing}", flush=True)
             is_complete = is_complete and not options.study

@@ -14,7 +14,14 @@ from typing import Any
 import pandas as pd
 from joblib import Parallel, delayed
 
-from experiments.tracking.figure_notes import figure_note, read_note, sentence, write_note
+from experiments.tracking.figure_notes import (
+    figure_note,
+    is_current,
+    made_of,
+    read_note,
+    sentence,
+    write_note,
+)
 from experiments.tracking.files import replace_file
 from experiments.tracking.names import inner_path, is_name
 from experiments.tracking.study_tables import TableError, read_tables
@@ -81,6 +88,7 @@ class Drawing:
         notes: what is listed of each figure, by its name.
         reasons: for each module that drew nothing, why.
         damage: which tables are not as they were written.
+        is_current: whether all was drawn before, and nothing is drawn again.
     """
 
     study: Path
@@ -88,6 +96,7 @@ class Drawing:
     notes: dict[str, dict[str, Any]] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
+    is_current: bool = False
 
     def __str__(self) -> str:
         """Why there are no images."""
@@ -98,24 +107,43 @@ class Drawing:
         )
 
 
-def draw_studies(studies: Sequence[Path], jobs: int = 1) -> Iterator[Drawing]:
+def draw_studies(
+    studies: Sequence[Path], jobs: int = 1, *, again: bool = False
+) -> Iterator[Drawing]:
     """Draw every figure that the tables of each study allow into its folder `figures`.
+
+    A study whose tables, and the code that draws, are those of its figures is left as it is.
 
     Args:
         studies: their folders.
         jobs: processes that draw, as joblib counts them; -1 for one a core.
+        again: whether what would stay the same is drawn too.
 
     Yields:
         the drawing of each study, in their order, once its figures are written and listed.
     """
+    changed = {study: _made_of(study) for study in studies if again or not is_current(study)}
     parallel = Parallel(n_jobs=jobs, return_as="generator")
     usual = signal.signal(signal.SIGINT, signal.SIG_IGN)  # inherited by workers: joblib stops them
     try:
-        parts = parallel(delayed(_draw)(study, name) for study in studies for name in FIGURES)
+        parts = parallel(delayed(_draw)(study, name) for study in changed for name in FIGURES)
     finally:
         signal.signal(signal.SIGINT, usual)
     for study in studies:
-        yield _listed(study, itertools.islice(parts, len(FIGURES)))
+        if study in changed:
+            yield _listed(study, itertools.islice(parts, len(FIGURES)), changed[study])
+        else:
+            notes = read_note(study)
+            images = [study / "figures" / f"{name}.png" for name in notes]
+            yield Drawing(study, images, notes, is_current=True)
+
+
+def _made_of(study: Path) -> str:
+    """What the figures of a study are made of; nothing if its tables cannot be read."""
+    try:
+        return made_of(study)
+    except OSError:
+        return ""
 
 
 def _draw(study: Path, name: str) -> Drawing:
@@ -172,8 +200,8 @@ def _versions(
         )
 
 
-def _listed(study: Path, parts: Iterator[Drawing]) -> Drawing:
-    """The parts of a study's drawing as one, its figures listed beside them.
+def _listed(study: Path, parts: Iterator[Drawing], made_of: str) -> Drawing:
+    """The parts of a study's drawing as one, its figures and what they are made of listed.
 
     What cannot be drawn again stays listed, and `results.py status` tells what is wrong with it.
     """
@@ -188,6 +216,7 @@ def _listed(study: Path, parts: Iterator[Drawing]) -> Drawing:
         whole.notes = old | whole.notes
         if old or reason in whole.damage:
             print(f"{study.name}: not drawn again: {name}: {reason}")
+            made_of = ""
     if whole.images:
-        write_note(study, whole.notes)
+        write_note(study, whole.notes, made_of)
     return whole

@@ -3,6 +3,7 @@
 {"study": null, or of the study's points and data: {"points": hash of their identities,
           "count": how many, "sources": {...}, "commits": [...], "dirty": ...,
           "started": [first, last]},
+ "made_of": hash of all tables and of the code that draws; empty if something is not drawn of them,
  "figures": {name: {"module": what draws it, "drawn_by": hash of its source,
                     "tables": {file: sha256, ...}, "files": {file: sha256, ...}}, ...}}
 """
@@ -19,11 +20,13 @@ from experiments.tracking.names import inner_path, is_digest, is_name
 from experiments.tracking.sealed import SealError, read_sealed, write_sealed
 from experiments.tracking.sources import source_hash
 from experiments.tracking.study import Collated
+from experiments.tracking.trees import canonical_json
 
 NOTE = "figures.json"
 SUFFIXES = (".png", ".pdf", ".txt")
 _FILES = ("tables", "files")  # of a figure's note, by name with digests
 _FIGURES = "paper_figures"  # the package whose modules draw
+_DRAWS = "drawing"  # the module that lists them
 
 
 def sentence(folder: Path) -> str:
@@ -97,10 +100,35 @@ def _listed_figures(folder: Path) -> dict[str, dict[str, Any]]:
     return figures
 
 
-def write_note(folder: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
-    """List the figures of a study, each by its `figure_note`."""
-    note = {"study": _data_origin(folder), "figures": dict(sorted(figures.items()))}
+def write_note(folder: Path, figures: Mapping[str, Mapping[str, Any]], made_of: str = "") -> None:
+    """List the figures of a study, each by its `figure_note`.
+
+    Args:
+        folder: the study's.
+        figures: by their names.
+        made_of: as of `made_of`, before they were drawn; empty if some could not be.
+    """
+    listed = dict(sorted(figures.items()))
+    note = {"study": _data_origin(folder), "made_of": made_of, "figures": listed}
     write_sealed(inner_path(folder, "figures", NOTE), note)
+
+
+def made_of(folder: Path) -> str:
+    """Hash of all that decides which figures a study has: its tables, and the code that draws."""
+    tables = sorted((folder / "tables").glob("*.csv"))
+    contents = {path.name: digest(read_file(path)) for path in tables}
+    return digest(canonical_json([contents, _drawing_source(_DRAWS)]))
+
+
+def is_current(folder: Path) -> bool:
+    """Whether all that can be drawn of a study is there, and drawing again would change nothing."""
+    try:
+        note = read_sealed(inner_path(folder, "figures", NOTE))
+        told, origin = note["made_of"], note["study"]
+        is_same = told == made_of(folder) and origin == _data_origin(folder)
+    except (OSError, ValueError, KeyError):
+        return False
+    return is_same and bool(note["figures"]) and not any(concerns(folder).values())
 
 
 def concerns(folder: Path) -> dict[str, list[str]]:

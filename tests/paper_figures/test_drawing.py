@@ -120,6 +120,39 @@ def test_every_file_tells_its_origin(tmp_path: Path) -> None:
     }
 
 
+def test_only_what_would_change_is_drawn_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def is_drawn(again: bool = False) -> bool:
+        before = [path.stat().st_mtime_ns for path in images]
+        (drawing,) = draw_studies([tmp_path], again=again)
+        assert {*drawing.images} == {*images}
+        is_new = before != [path.stat().st_mtime_ns for path in images]
+        assert drawing.is_current != is_new
+        return is_new
+
+    write_tables(tmp_path, STATE_SPACE)
+    images = draw(tmp_path).images
+    assert not is_drawn()
+    assert is_drawn(again=True)
+    images[0].with_suffix(".txt").write_text("by hand")
+    assert is_drawn()
+    table = tmp_path / "tables" / "example_regions.csv"
+    table.write_text(table.read_text() + table.read_text().splitlines()[-1] + "\n")
+    assert is_drawn()
+    assert not is_drawn()
+    of_another = tmp_path / "tables" / "rank_curve.csv"
+    of_another.write_text(curve_rows().query("truth == 'c1'").to_csv(index=False))
+    images += draw(tmp_path).images[1:]
+    assert [path.stem for path in images] == ["state_space", "rank_curve"]
+    assert not is_drawn()
+    # One that cannot be drawn any more is told of each time.
+    of_another.unlink()
+    del images[1]
+    assert is_drawn()
+    assert is_drawn()
+
+
 def test_a_figure_without_its_table_stays_listed_and_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -160,7 +193,9 @@ def test_the_command_draws_what_is_there_and_refuses_what_is_not(
     assert run("poor", "full", "--results", str(tmp_path / "results")) == 1
     first, second = capsys.readouterr().out.splitlines()
     assert first.endswith("run the study first, python experiments/run.py -m experiment=poor")
-    assert second == f"drawn: {tmp_path}/results/full/figures/state_space.png"
+    assert second == f"up to date: {tmp_path}/results/full/figures"
+    assert run("full", "--again") == 0
+    assert capsys.readouterr().out == f"drawn: {tmp_path}/results/full/figures/state_space.png\n"
     with pytest.raises(SystemExit):
         run("--jobs", "0")
     assert "0 processes draw nothing; -1 is one a core" in capsys.readouterr().err
