@@ -71,6 +71,7 @@ MLCI = {
     "mlci.set_search": "mlci.spaces",
     "mlci.selection": "mlci.first_exit mlci.fixed_horizon mlci.set_search mlci.sets",
     "mlci.table_inference": "mlci.causal_entropy mlci.evidence mlci.first_exit mlci.fixed_horizon",
+    "mlci.baselines": "mlci.maxent",
     "mlci.diagnosis": "mlci.tabular",
     "mlci.end_moves": "mlci.tabular",
     "mlci.recursions": "mlci.compiled mlci.tabular",

@@ -17,6 +17,7 @@ from typing import Any
 
 import pandas as pd
 
+from experiments.collate.baselines import baseline_differences
 from experiments.collate.cases import case_names, case_table
 from experiments.collate.chosen_tasks import chosen_tasks, early_overlap, unfound
 from experiments.collate.current import made_of
@@ -158,6 +159,8 @@ def _made_tables(
         made["reliability"] = reliability(pd.read_csv(joined["calibration"]))
     if "evidence" in joined:
         made["evidence_kinds"] = evidence_kinds(pd.read_csv(joined["evidence"]))
+    if "baselines" in joined:
+        made["baseline_differences"] = baseline_differences(pd.read_csv(joined["baselines"]))
     if "next_task" in joined:
         table = pd.read_csv(joined["next_task"])
         made["chosen_tasks"], made["unfound"] = chosen_tasks(table), unfound(table)

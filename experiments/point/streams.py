@@ -22,6 +22,7 @@ class Purpose(IntEnum):
     EVIDENCE = 5
     NEXT_TASK = 6
     SETS = 7
+    BASELINES = 8
 
 
 def stream(seed: int, purpose: Purpose, *index: int) -> np.random.Generator:

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
+from experiments.point.baseline_tables import baseline_table
 from experiments.point.belief_counts import belief_counts
 from experiments.point.evidence_kinds import evidence_table
 from experiments.point.forecasts import forecast_table
@@ -49,7 +50,7 @@ def point_tables(
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
         `dimensions` of the state, and `regions` of the truth. If asked for, `sets` and
         `set_marginals`; `calibration`, and `evidence` and `forecasts` where these are calibrated;
-        and `next_task`.
+        `baselines`, and `next_task`.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -84,6 +85,8 @@ def point_tables(
         if point.calibration is not None and settings.inference.exact_ends:
             tables["evidence"] = evidence_table(settings, point, point.calibration)
             tables["forecasts"] = forecast_table(point.calibration)
+    if settings.baselines.paths:
+        tables["baselines"] = baseline_table(settings, point)
     if settings.next_task.repetitions:
         tables["next_task"] = next_task_table(settings, point)
     return tables

@@ -4,6 +4,7 @@ from experiments.config.settings.advice import AdviceSettings
 from experiments.config.settings.kinds import ESTIMATE
 from experiments.config.settings.parts import (
     NO_TRUTH,
+    BaselineSettings,
     CalibrationSettings,
     DemonstrationSettings,
     GridSettings,
@@ -37,6 +38,7 @@ __all__ = [
     "NO_TRUTH",
     "AdviceSettings",
     "BallSettings",
+    "BaselineSettings",
     "CalibrationSettings",
     "DemonstrationSettings",
     "GridSettings",

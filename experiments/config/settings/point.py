@@ -21,6 +21,7 @@ from experiments.config.settings.kinds import (
     one_or_list,
 )
 from experiments.config.settings.parts import (
+    BaselineSettings,
     CalibrationSettings,
     DemonstrationSettings,
     GridSettings,
@@ -128,6 +129,7 @@ class Settings(ModelSettings):
     safety: SafetySettings
     ranks: RankSettings
     calibration: CalibrationSettings
+    baselines: BaselineSettings
     next_task: NextTaskSettings
     rollouts: Annotated[
         CountOrNone,
