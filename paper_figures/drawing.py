@@ -26,6 +26,7 @@ from experiments.tracking.files import replace_file
 from experiments.tracking.names import inner_path, is_name
 from experiments.tracking.study_tables import TableError, read_tables
 from paper_figures import (
+    baselines,
     calibration_diagram,
     choice_effects,
     chosen_tasks,
@@ -74,6 +75,7 @@ FIGURES: Mapping[str, ModuleType] = {
         chosen_tasks,
         success,
         success_cases,
+        baselines,
     )
 }
 

@@ -14,6 +14,7 @@ from paper_figures.report import (
     claim_4,
     claim_5,
     claim_6,
+    section_baselines,
     section_beliefs,
     section_choices,
     section_chosen_tasks,
@@ -133,6 +134,11 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         "Evidence, and forecasts that come true",
         section_evidence.section,
         (Figure("calibration", "forecast_diagram", "Share that is crossed against its forecast."),),
+    ),
+    (
+        "Other ways to rank regions",
+        section_baselines.section,
+        (Figure("baselines", "baselines", "Rank of the truth by six methods."),),
     ),
     (
         "What to record next",

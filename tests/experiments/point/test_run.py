@@ -21,7 +21,7 @@ WORDS = ["truth=wall", "horizon=4.0", "dt=0.5", "actions=3", "grid.shape=[16,8]"
 WORDS += ["safety.shape=[41,21]", "demonstrations.pairs=14", "demonstrations.keep=11"]
 WORDS += ["demonstrations.restarts=1", "demonstrations.dt=0.05", "demonstrations.clip=true"]
 WORDS += ["ranks.demonstrations=10", "ranks.subsets=6"]
-WORDS += ["ranks.top=4", "rollouts=2"]
+WORDS += ["ranks.top=4", "rollouts=2", "baselines.paths=5"]
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +55,18 @@ def test_ranks_are_in_the_top_up_to_the_last_place(point: tuple) -> None:
     ranks = point[1]["ranks"]
     assert (ranks["rank"] == 4).any()
     np.testing.assert_array_equal(ranks["share_top_4"], (ranks["rank"] <= 4).astype(int))
+
+
+def test_baselines_are_ranked_on_the_subsets_of_ranks(point: tuple) -> None:
+    ranks, rows = point[1]["ranks"], point[1]["baselines"]
+    assert rows["demonstrations"].unique().tolist() == [1, 3, 5, 9]
+    for name, group in rows.groupby("demonstrations"):
+        of_size, one = ranks[ranks["demonstrations"] == name], group.set_index("method")
+        assert one.loc["ours", "rank"] == pytest.approx(of_size["rank"].mean())
+        assert one.loc["ours", "top"] == pytest.approx(of_size["share_top_4"].mean())
+        assert len(one) == 6
+    assert (rows.loc[rows["method"] == "uniform", "first"] == 0).all()
+    assert rows["log_rank"].between(0, np.log(rows["rank"]) + 1e-12).all()
 
 
 def test_first_are_the_first_five_and_probabilities_those_of_one_trial(point: tuple) -> None:

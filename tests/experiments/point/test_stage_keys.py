@@ -79,6 +79,7 @@ CHANGES = {
     "ranks.top": ("ranks.top=3", NOTHING),
     "calibration.sets": ("truth=none calibration.sets=3", TRUTH),  # with another truth, see there
     "calibration.demonstrations": ("calibration.demonstrations=[1]", NOTHING),
+    "baselines.paths": ("baselines.paths=7", NOTHING),
     "next_task.repetitions": ("next_task.repetitions=2", NOTHING),
     "next_task.pool": ("next_task.pool=7", NOTHING),
     "next_task.most": ("next_task.most=7", NOTHING),
