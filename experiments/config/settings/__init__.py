@@ -1,10 +1,10 @@
 """Every value of a config, in frozen dataclasses: its type, range, meaning and unit."""
 
 from experiments.config.settings.advice import AdviceSettings
+from experiments.config.settings.baselines import BaselineSettings
 from experiments.config.settings.kinds import ESTIMATE
 from experiments.config.settings.parts import (
     NO_TRUTH,
-    BaselineSettings,
     CalibrationSettings,
     DemonstrationSettings,
     GridSettings,

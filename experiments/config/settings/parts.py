@@ -276,16 +276,6 @@ class CalibrationSettings:
 
 
 @dataclass(frozen=True, config=STRICT)
-class BaselineSettings:
-    """Other ways to rank regions, compared on the same demonstrations."""
-
-    paths: Annotated[
-        CountOrNone,
-        about("sampled unconstrained paths of each task, for baselines; 0 compares none"),
-    ]
-
-
-@dataclass(frozen=True, config=STRICT)
 class NextTaskSettings:
     """How many demonstrations it takes if tasks are chosen for what they teach."""
 

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
+from experiments.config.settings.baselines import BaselineSettings
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
@@ -21,7 +22,6 @@ from experiments.config.settings.kinds import (
     one_or_list,
 )
 from experiments.config.settings.parts import (
-    BaselineSettings,
     CalibrationSettings,
     DemonstrationSettings,
     GridSettings,
