@@ -51,6 +51,7 @@ def adapted_proposal(
             draws.paths[:, : -1 : passage.substeps],
             draws.controls,
             draws.mode_share * weight[:, None],
+            passage.limits,
         )
         shares = weight @ draws.mode_share
         if number >= _FEWEST and effective_count(log_weight) >= _ENOUGH * len(log_weight):

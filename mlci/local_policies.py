@@ -20,6 +20,7 @@ import numpy as np
 from mlci.modes import GOAL_SHARE, Modes
 from mlci.passage import Passage
 from mlci.spaces import Floats, Ints
+from mlci.truncated_normal import mean_and_variance
 
 _LEAST = 0.3  # of the reward's own curvature by a control, which Q_uu keeps where V is not convex
 _NUDGE = 1e-4  # by which second derivatives are taken
@@ -58,6 +59,12 @@ class LocalPolicies:
         return np.asarray(
             self.mean[number] + np.einsum("tij,btj->bti", self.gain[number], apart, optimize=True)
         )
+
+    def deviates(self, number: int, states: Floats, controls: Floats) -> Floats:
+        """(N, T, m) the standard normal numbers that make a policy take controls (N, T, m)."""
+        rest = controls - self.means(number, states)
+        inverse = np.linalg.inv(self.root[number])
+        return np.asarray(np.einsum("tij,btj->bti", inverse, rest, optimize=True))
 
 
 def riccati_policies(passage: Passage, modes: Modes) -> tuple[LocalPolicies, Floats]:
@@ -123,18 +130,24 @@ def _inverse(q_uu: Floats, least: Floats) -> Floats:
 
 
 def refit(
-    policies: LocalPolicies, states: Floats, controls: Floats, share: Floats
+    policies: LocalPolicies,
+    states: Floats,
+    controls: Floats,
+    share: Floats,
+    limits: tuple[Floats, Floats],
 ) -> LocalPolicies:
     """The policies that weighted paths would most likely come from: a round of cross-entropy.
 
     For each time and policy a linear regression of the control on the state, in which the policy
-    before counts as some effective samples.
+    before counts as some effective samples. Limits make means and variances others than those of
+    the policy, so that what is fitted is how far the paths are from what it gives within them.
 
     Args:
         policies: P policies that are near to the paths.
         states: (N, T, n) where controls begin.
         controls: (N, T, m) controls.
         share: (N, P) weight of each path that belongs to each policy.
+        limits: (m,) least and largest controls.
     """
     mean, gain, root = policies.mean.copy(), policies.gain.copy(), policies.root.copy()
     for p in range(len(policies)):
@@ -142,21 +155,40 @@ def refit(
         if not len(used):
             continue
         weight = share[used, p] / np.sum(share[used, p])
-        effective = 1 / np.sum(np.square(weight))
+        rest, variance = _rest(policies, p, states[used], controls[used], limits)
+        expected = np.einsum("b,bti->ti", weight, variance)[:, None, :]
+        rest = np.moveaxis(rest, 1, 0)
         apart = states[used] - policies.states[p]
-        rest = np.moveaxis(controls[used] - policies.means(p, states[used]), 1, 0)
         design = np.moveaxis(np.concatenate([np.ones((*apart.shape[:2], 1)), apart], -1), 1, 0)
         scale = np.sqrt(np.einsum("b,tbi->ti", weight, np.square(design)))[:, None, :]
-        design = design / np.where(scale > 0, scale, 1.0)
-        prior = _PRIOR * design.shape[-1] / effective
+        scale = np.where(scale > 0, scale, 1.0)
+        design = design / scale
+        prior = _PRIOR * design.shape[-1] * np.sum(np.square(weight))
         weighted = (design * weight[:, None]).mT
         normal = weighted @ design + prior * np.eye(design.shape[-1])
         change = np.linalg.solve(normal, weighted @ rest)
-        rest = rest - design @ change
-        scatter = (rest * weight[:, None]).mT @ rest
-        change = change / np.where(scale > 0, scale, 1.0).mT
-        mean[p] += change[:, 0]
-        gain[p] += change[:, 1:].mT
-        before = policies.root[p] @ policies.root[p].mT
-        root[p] = np.linalg.cholesky((scatter + prior * before) / (1 + prior))
+        rest = (rest - design @ change) / np.sqrt(np.maximum(expected, _LEAST))
+        scatter = (rest * weight[:, None]).mT @ rest + prior * np.eye(rest.shape[-1])
+        change = change / np.maximum(expected, _LEAST) / scale.mT
+        change = policies.root[p] @ change.mT  # (T, m, 1 + n)
+        mean[p] += change[..., 0]
+        gain[p] += change[..., 1:]
+        root[p] = policies.root[p] @ np.linalg.cholesky(scatter / (1 + prior))
     return LocalPolicies(policies.mode, policies.states, mean, gain, root)
+
+
+def _rest(
+    policies: LocalPolicies,
+    number: int,
+    states: Floats,
+    controls: Floats,
+    limits: tuple[Floats, Floats],
+) -> tuple[Floats, Floats]:
+    """Deviates (N, T, m) less their mean within the limits, and their variance there (N, T, m)."""
+    deviates = policies.deviates(number, states, controls)
+    if np.all(np.isinf(limits)):
+        return deviates, np.ones(deviates.shape)
+    diagonal = np.diagonal(policies.root[number], axis1=-2, axis2=-1)
+    middle = controls - diagonal * deviates
+    mean, variance = mean_and_variance(*((limit - middle) / diagonal for limit in limits))
+    return deviates - mean, variance

@@ -18,8 +18,10 @@ from mlci.local_policies import LocalPolicies
 from mlci.passage import Passage
 from mlci.simulate import rk4_step
 from mlci.spaces import Bools, Floats, Ints
+from mlci.truncated_normal import log_mass, quantile
 
-WIDTHS = np.array([1.0, 1.15, 1.5])
+# Widths are 1 + these / sqrt(number of controls): the length of a normal vector spreads so.
+_WIDER = np.array([0.0, 0.7, 2.2])
 _SHARES = np.array([0.5, 0.4, 0.1])  # of a policy's samples that each width takes
 
 
@@ -42,9 +44,10 @@ class Proposal:
     @classmethod
     def of(cls, policies: LocalPolicies, shares: Floats, samples: int) -> Proposal:
         """Each policy at each width, at least once; shares (P,) of policies add up to 1."""
-        policy = np.repeat(np.arange(len(policies)), len(WIDTHS))
+        policy = np.repeat(np.arange(len(policies)), len(_WIDER))
+        widths = 1 + _WIDER / np.sqrt(policies.mean[0].size)
         count = np.maximum(1, np.round(samples * np.outer(shares, _SHARES).ravel()))
-        return cls(policies, policy, np.tile(WIDTHS, len(policies)), count.astype(np.int64))
+        return cls(policies, policy, np.tile(widths, len(policies)), count.astype(np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,30 +127,9 @@ def _truncated(
     for j in range(mean.shape[1]):
         middle = mean[:, j] + np.einsum("bi,bi->b", root[:, j, :j], deviates[:, :j])
         low, high = ((limit[j] - middle) / root[:, j, j] for limit in limits)
-        deviates[:, j] = _normal_between(low, high, uniform[:, j])
+        deviates[:, j] = quantile(low, high, uniform[:, j])
         control[:, j] = np.clip(middle + root[:, j, j] * deviates[:, j], limits[0][j], limits[1][j])
     return control
-
-
-def _normal_between(low: Floats, high: Floats, uniform: Floats) -> Floats:
-    """Standard normal numbers between two bounds, by the inverse of their distribution function.
-
-    Bounds above 0 are mirrored, where the function does not round to 1, and its logarithm is used,
-    which does not vanish below.
-    """
-    flip, log_below, log_mass = _below_and_between(low, high)
-    with np.errstate(divide="ignore"):
-        number = scipy.special.ndtri_exp(np.logaddexp(log_below, np.log(uniform) + log_mass))
-    return np.clip(np.where(flip, -number, number), low, high)
-
-
-def _below_and_between(low: Floats, high: Floats) -> tuple[Bools, Floats, Floats]:
-    """Which bounds are mirrored, and log probabilities of standard normal numbers below them and
-    between them."""
-    flip = low > 0
-    least, most = np.where(flip, -high, low), np.where(flip, -low, high)
-    log_below, log_most = scipy.special.log_ndtr(least), scipy.special.log_ndtr(most)
-    return flip, log_below, log_most + np.log1p(-np.exp(log_below - log_most))
 
 
 def _log_densities(
@@ -160,8 +142,7 @@ def _log_densities(
     for p in range(len(policies)):
         root = policies.root[p]
         diagonal = np.diagonal(root, axis1=-2, axis2=-1)
-        rest = controls - policies.means(p, states)
-        deviates = np.einsum("tij,btj->bti", np.linalg.inv(root), rest, optimize=True)
+        deviates = policies.deviates(p, states, controls)
         squares = np.sum(np.square(deviates), axis=(1, 2))
         constant = -np.sum(np.log(diagonal)) - size / 2 * np.log(2 * np.pi)
         for component in np.flatnonzero(proposal.policy == p):
@@ -170,5 +151,5 @@ def _log_densities(
             if limited:
                 middle = controls - diagonal * deviates
                 low, high = ((limit - middle) / (width * diagonal) for limit in passage.limits)
-                found[:, component] -= np.sum(_below_and_between(low, high)[2], axis=(1, 2))
+                found[:, component] -= np.sum(log_mass(low, high), axis=(1, 2))
     return found

@@ -88,7 +88,25 @@ def test_a_refit_to_the_law_itself_changes_nothing_and_from_elsewhere_leads_ther
         policies.mode, policies.states, policies.mean + 1.0, 0 * policies.gain, 2 * policies.root
     )
     for before in (policies, elsewhere):
-        after = refit(before, states[:, :-1], controls, np.ones((4000, 1)))
+        after = refit(before, states[:, :-1], controls, np.ones((4000, 1)), passage.limits)
         np.testing.assert_allclose(after.root, policies.root, rtol=0.1)
         gap = after.means(0, states[:, :-1]) - policies.means(0, states[:, :-1])
         assert np.sqrt(np.mean(np.square(gap / policies.root[0, :, 0]))) < 0.1
+
+
+def test_a_refit_finds_a_policy_behind_a_limit():
+    """A regression of limited controls would find less of everything."""
+    rng, limits = np.random.default_rng(0), (np.array([-1.0]), np.array([0.8]))
+    states = rng.normal(size=(20_000, 1, 2))
+    wanted = 0.6 + states @ [0.5, -0.3] + 0.9 * rng.standard_normal((20_000, 1))
+    kept = (wanted[:, 0] > -1.0) & (wanted[:, 0] < 0.8)
+    one = np.ones((1, 1, 1))
+    policies = LocalPolicies(
+        np.array([0]), np.zeros((1, 1, 2)), 0 * one, np.zeros((1, 1, 1, 2)), 0.7 * one[..., None]
+    )
+    share = np.ones((np.sum(kept), 1))
+    for _ in range(60):
+        policies = refit(policies, states[kept], wanted[kept][..., None], share, limits)
+    assert policies.mean[0, 0, 0] == pytest.approx(0.6, abs=0.1)
+    np.testing.assert_allclose(policies.gain[0, 0, 0], [0.5, -0.3], atol=0.07)
+    assert policies.root[0, 0, 0, 0] == pytest.approx(0.9, abs=0.1)

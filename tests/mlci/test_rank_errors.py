@@ -19,7 +19,7 @@ from mlci.tabular import discretize
 
 PENDULUM = Pendulum()
 BANDS = Regions.from_grid(PENDULUM.space, (4, 4))
-MODEL = SampledModel(PENDULUM, BANDS, 0.25, samples=300)
+MODEL = SampledModel(PENDULUM, BANDS, 0.25, samples=300, substeps=2, restarts=2)
 
 
 def swing(torque: float, name: str) -> Demonstration:
