@@ -124,13 +124,25 @@ def test_replicates_and_samples_are_of_the_same_distribution():
     assert np.all(distribution.passage.excess(paths[:, -1]) <= 1)
 
 
+@pytest.mark.long
 def test_phi_converges_as_the_hold_gets_shorter():
-    phi = [
-        replace(MODEL, dt=dt, samples=3000).distribution(TASK).violation_probabilities()
-        for dt in (1.0, 0.5, 0.25)
-    ]
-    changes = [np.mean(np.abs(phi[0] - phi[1])), np.mean(np.abs(phi[1] - phi[2]))]
-    assert changes[1] < 0.7 * changes[0]
+    holds = [1.0, 0.5, 0.25, 0.125]
+    *coarse, finest = (
+        replace(MODEL, dt=dt, samples=8000, restarts=6, substeps=round(dt / 0.03125)).distribution(
+            Task(np.array([4.0, 1.0]), Box([1.0, -0.2], [1.2, 0.2]), 5.0)
+        )
+        for dt in [*holds, 0.03125]
+    )
+    phi, error = finest.violation_probabilities(), finest.avoidance_errors()
+    gaps = []
+    for each in coarse:
+        apart = np.square(each.violation_probabilities() - phi)
+        noise = np.square(each.avoidance_errors()) + np.square(error)
+        gaps.append(np.sqrt(np.mean(apart - noise)))
+    slope = np.polyfit(np.log(holds), np.log(gaps), 1)[0]
+    assert 0.4 < slope < 1.2
+    assert np.all(np.diff(gaps) < 0)
+    assert gaps[-1] < 0.03
 
 
 def test_a_goal_out_of_reach_is_impossible():
