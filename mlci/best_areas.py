@@ -13,7 +13,7 @@ import numpy as np
 import scipy  # loads scipy.sparse when it is first used
 
 from mlci.evidence import TIE
-from mlci.spaces import Bools, Floats
+from mlci.spaces import Bools, Floats, Ints
 
 HALF = float(np.log(2.0))  # nat: what is this much below the best is half as probable
 
@@ -31,6 +31,17 @@ class AreaScores:
     overlap: Floats
     precision: Floats
     share: Floats
+
+
+def most_probable_area(
+    gain: Floats, neighbours: scipy.sparse.csr_matrix, below: float = HALF
+) -> Bools:
+    """(C,) the regions of the area of the best region, the first one where several tie."""
+    members, group = _groups(gain, neighbours, below)
+    best = group[np.searchsorted(members, int(np.argmax(gain)))]
+    mask = np.zeros(len(gain), dtype=bool)
+    mask[members[group == best]] = True
+    return mask
 
 
 def area_scores(
@@ -53,13 +64,19 @@ def _scores(
 ) -> tuple[float, float, float]:
     """Overlap, precision and share of one ranking's most probable area."""
     best = np.max(gain)
-    members = np.flatnonzero((gain >= best - below) | (gain == best))
-    from scipy.sparse import csgraph
-
-    part = neighbours[members][:, members]
-    _, group = csgraph.connected_components(part, directed=False)
+    members, group = _groups(gain, neighbours, below)
     size, hits = np.bincount(group), np.bincount(group, good[members])
     # The area of each best region; with an infinite gain only equals tie.
     mine = group[(gain[members] == best) | (gain[members] >= best - TIE)]
     overlap, precision = hits[mine] > 0, hits[mine] / size[mine]
     return float(overlap.mean()), float(precision.mean()), float(np.mean(size[mine]) / len(gain))
+
+
+def _groups(gain: Floats, neighbours: scipy.sparse.csr_matrix, below: float) -> tuple[Ints, Ints]:
+    """Numbers of the regions that are good enough, and of the area that each belongs to."""
+    best = np.max(gain)
+    members = np.flatnonzero((gain >= best - below) | (gain == best))
+    from scipy.sparse import csgraph
+
+    _, group = csgraph.connected_components(neighbours[members][:, members], directed=False)
+    return members, group

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mlci.demonstrations import Demonstration
 from mlci.evidence import PAPER, Rates, log_evidence, total_gain
@@ -139,11 +140,11 @@ class SetEvidence:
         rest[last] = False
         return float(self.beside(rest)[last])
 
-    def of_first(self, count: int) -> SetEvidence:
-        """That of the first demonstrations alone; what was asked of their tasks stays known."""
-        first = slice(count)
+    def of_some(self, demonstrations: ArrayLike) -> SetEvidence:
+        """That of some demonstrations, by number; what was asked of their tasks stays known."""
+        some = np.asarray(demonstrations, dtype=np.int64)
         return SetEvidence(
-            self.avoidance[first], self.violated[first], self.rates, self.silent[first]
+            [self.avoidance[j] for j in some], self.violated[some], self.rates, self.silent[some]
         )
 
     def _alpha(self, number: int, beside: Beside, members: Bools) -> Floats:

@@ -74,6 +74,26 @@ class SetPrior:
         sizes = (none, *((1 - none) * shares / np.sum(shares)).tolist())
         return cls(sizes, adjacency, neighbours)
 
+    @classmethod
+    def independent(
+        cls,
+        count: int,
+        log_odds: float,
+        adjacency: float = 0.0,
+        neighbours: scipy.sparse.csr_matrix | None = None,
+    ) -> SetPrior:
+        """Each of some regions has these odds [nat] by itself: P(B) ~ e^(log_odds |B| + J pairs).
+
+        Where C cells tile a plane, an adjacency J with log odds of -2 J makes a set as probable as
+        the length of its border says, whatever it encloses.
+        """
+        size = np.arange(count + 1)
+        number = scipy.special.gammaln(count + 1) - scipy.special.gammaln(size + 1)
+        number -= scipy.special.gammaln(count - size + 1)
+        weight = number + log_odds * size
+        sizes = np.exp(weight - scipy.special.logsumexp(weight))
+        return cls(tuple((sizes / np.sum(sizes)).tolist()), adjacency, neighbours)
+
     @property
     def largest(self) -> int:
         """K, the most regions of a set."""

@@ -26,6 +26,7 @@ from experiments.tracking.files import replace_file
 from experiments.tracking.names import inner_path, is_name
 from experiments.tracking.study_tables import TableError, read_tables
 from paper_figures import (
+    area_cover,
     baselines,
     calibration_diagram,
     choice_effects,
@@ -70,6 +71,7 @@ FIGURES: Mapping[str, ModuleType] = {
         time_and_memory,
         choice_effects,
         readings,
+        area_cover,
         wrong_model,
         rule_breaking,
         chosen_tasks,

@@ -44,9 +44,14 @@ def study_tables(tables: Mapping[str, Path]) -> dict[str, pd.DataFrame]:
     """The tables of a whole study, from those of its points.
 
     Args:
-        tables: the collated tables by name: `trials` makes `measures`, `ranks` makes `rank_curve`.
+        tables: the collated tables by name: `trials` makes `measures`, `ranks` makes `rank_curve`,
+            and `areas`, where it is, `area_curve`.
     """
-    makers = {"measures": ("trials", measures), "rank_curve": ("ranks", rank_curve)}
+    makers = {
+        "measures": ("trials", measures),
+        "rank_curve": ("ranks", rank_curve),
+        "area_curve": ("areas", area_curve),
+    }
     return {
         name: make(_read(tables[source]))
         for name, (source, make) in makers.items()
@@ -103,6 +108,31 @@ def rank_curve(ranks: pd.DataFrame) -> pd.DataFrame:
             row |= dict(zip(("median_low", "median_high"), limits, strict=True))
             means = _mean_and_limits(subsets[shares].to_numpy(dtype=float), counts)
             for name, *values in zip(shares, *means, strict=True):
+                row |= dict(zip((name, f"{name}_low", f"{name}_high"), values, strict=True))
+            rows.append({**row, "seeds": len(seeds)})
+    return pd.DataFrame(rows)
+
+
+def area_curve(areas: pd.DataFrame) -> pd.DataFrame:
+    """How well each method covers the truth, for each number of demonstrations of a group.
+
+    Args:
+        areas: opening columns up to `seed`, `demonstrations`, `subset`, `method`, and columns whose
+            means count; NaN is no value.
+
+    Returns:
+        The opening columns but `seed`; `demonstrations`, `method`; the mean of each other column
+        with `_low` and `_high`; how many `seeds`.
+    """
+    rows = []
+    for opening, group in _groups(areas, ["demonstrations", "subset"]):
+        names = _columns_after(group, "method")
+        for (size, method), subsets in group.groupby(["demonstrations", "method"], sort=False):
+            seeds = _sizes(subsets)
+            counts = resamples(seeds, [*opening.values(), str(size)])  # alike for all methods
+            row = {**opening, "demonstrations": size, "method": method}
+            means = _mean_and_limits(subsets[names].to_numpy(dtype=float), counts)
+            for name, *values in zip(names, *means, strict=True):
                 row |= dict(zip((name, f"{name}_low", f"{name}_high"), values, strict=True))
             rows.append({**row, "seeds": len(seeds)})
     return pd.DataFrame(rows)

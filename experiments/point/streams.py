@@ -23,6 +23,7 @@ class Purpose(IntEnum):
     NEXT_TASK = 6
     SETS = 7
     BASELINES = 8
+    AREAS = 9
 
 
 def stream(seed: int, purpose: Purpose, *index: int) -> np.random.Generator:

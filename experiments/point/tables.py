@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
+from experiments.point.area_tables import area_tables
 from experiments.point.baseline_tables import baseline_table
 from experiments.point.belief_counts import belief_counts
 from experiments.point.evidence_kinds import evidence_table
@@ -50,7 +51,7 @@ def point_tables(
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
         `dimensions` of the state, and `regions` of the truth. If asked for, `sets` and
         `set_marginals`; `calibration`, and `evidence` and `forecasts` where these are calibrated;
-        `baselines`, and `next_task`.
+        `baselines`, `next_task`, and `areas` and `area_map`.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -87,6 +88,8 @@ def point_tables(
             tables["forecasts"] = forecast_table(point.calibration)
     if settings.baselines.paths:
         tables["baselines"] = baseline_table(settings, point)
+    if settings.areas.subsets:
+        tables |= area_tables(settings, point)
     if settings.next_task.repetitions:
         tables["next_task"] = next_task_table(settings, point)
     return tables

@@ -14,6 +14,7 @@ from paper_figures.report import (
     claim_4,
     claim_5,
     claim_6,
+    section_areas,
     section_baselines,
     section_beliefs,
     section_choices,
@@ -124,6 +125,11 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
                 "wrong_model", "wrong_model", "What a wrong model of demonstrators does to answers."
             ),
         ),
+    ),
+    (
+        "Areas: truths that are larger than any hypothesis",
+        section_areas.section,
+        (Figure("areas", "area_cover", "How well sets of hypotheses cover two ellipses."),),
     ),
     (
         "Calibration of the posterior",

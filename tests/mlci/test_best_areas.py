@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from mlci.best_areas import area_scores
+from mlci.best_areas import area_scores, most_probable_area
 
 LINE = sparse.csr_matrix(np.eye(6, k=1) + np.eye(6, k=-1) + np.eye(6))
 GOOD = np.array([False, True, False, False, False, True])
@@ -31,3 +31,8 @@ def test_a_wider_margin_joins_more() -> None:
     gains = np.array([[0.0, 3.0, 2.0, 0.0, 0.0, 0.0]])
     assert area_scores(gains, LINE, GOOD).share[0] == 1 / 6
     assert area_scores(gains, LINE, GOOD, below=1.5).share[0] == 2 / 6
+
+
+def test_the_area_of_the_first_best_region() -> None:
+    gain = np.array([0.0, 3.0, 2.5, 0.0, 3.0, 0.0])
+    assert np.flatnonzero(most_probable_area(gain, LINE)).tolist() == [1, 2]

@@ -263,7 +263,7 @@ def test_what_cannot_be_selected_by_is_refused() -> None:
     with pytest.raises(ValueError, match="at least one set, not 0"):
         select_regions(evidence, regions.names, width=0)
     with pytest.raises(ValueError, match="selected by demonstrations, and there are none"):
-        select_regions(evidence.of_first(0), regions.names)
+        select_regions(evidence.of_some([]), regions.names)
 
 
 def as_paths(table: Table, paths: list[list[dense.Move]]) -> list[TablePath]:

@@ -206,7 +206,7 @@ def test_a_silent_region_adds_nothing_to_another() -> None:
 def test_the_first_demonstrations_alone() -> None:
     model = small_model()
     demonstrations, inference = inferred(model)
-    first = SetEvidence.of(model, demonstrations, inference).of_first(1)
+    first = SetEvidence.of(model, demonstrations, inference).of_some([0])
     again = SetEvidence.of(model, demonstrations[:1], inference.of(slice(1)))
     mask = np.isin(np.arange(30), [13, 14])
     np.testing.assert_array_equal(first.beside(mask), again.beside(mask))
@@ -284,6 +284,13 @@ def test_a_geometric_prior_and_neighbours() -> None:
     logs = gammaln(101) - 2 * gammaln(51)
     assert many.log(half) == pytest.approx(np.log(many.sizes[50]) - logs)
     assert prior.log_beside(three).tolist() == [prior.log(three)] * 3 + [-np.inf]
+
+
+def test_independent_regions_have_their_odds() -> None:
+    prior = SetPrior.independent(4, -1.5, adjacency=0.75, neighbours=LINE)
+    nothing, three = np.zeros(4, dtype=bool), np.array([True, True, False, True])
+    assert prior.log(three) - prior.log(nothing) == pytest.approx(3 * -1.5 + 0.75)
+    assert prior.largest == 4
 
 
 def test_what_does_not_fit_is_refused() -> None:

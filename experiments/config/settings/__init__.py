@@ -1,6 +1,7 @@
 """Every value of a config, in frozen dataclasses: its type, range, meaning and unit."""
 
 from experiments.config.settings.advice import AdviceSettings
+from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
 from experiments.config.settings.kinds import ESTIMATE
 from experiments.config.settings.parts import (
@@ -37,6 +38,7 @@ __all__ = [
     "ESTIMATE",
     "NO_TRUTH",
     "AdviceSettings",
+    "AreaSettings",
     "BallSettings",
     "BaselineSettings",
     "CalibrationSettings",

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
+from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
 from experiments.config.settings.kinds import (
     STRICT,
@@ -131,6 +132,7 @@ class Settings(ModelSettings):
     calibration: CalibrationSettings
     baselines: BaselineSettings
     next_task: NextTaskSettings
+    areas: AreaSettings
     rollouts: Annotated[
         CountOrNone,
         about(
