@@ -99,7 +99,8 @@ def search(
         if not larger:
             return np.array(added, dtype=np.int64), np.array(steps), 0.0
         beam = _best(larger, width)
-        rise = sum(beam[0][1]) - best
+        total = sum(beam[0][1])
+        rise = 0.0 if total == best else total - best  # infinite ones are equal
         if rise <= least or len(added) == most:
             return np.array(added, dtype=np.int64), np.array(steps), float(rise)
 
@@ -122,7 +123,8 @@ def _best(sets: list[_Set], width: int) -> list[_Set]:
     total = np.array([sum(steps) for _, steps in sets])
     order: list[int] = []
     while len(order) < min(width, len(sets)):
-        order.append(int(np.argmax(total > np.max(total) - _TIE)))
+        best = np.max(total)
+        order.append(int(np.argmax((total > best - _TIE) | (total == best))))  # also if infinite
         total[order[-1]] = -np.inf
     return [sets[place] for place in order]
 

@@ -258,6 +258,16 @@ def test_pruned_regions_are_explained_by_others() -> None:
         assert evidence.gain(pruned.mask) > evidence.gain(rest)
 
 
+def test_a_region_that_cannot_be_avoided_comes_first_and_ends_it() -> None:
+    def beside(others: np.ndarray) -> np.ndarray:
+        return np.where(others[2] | (np.arange(3) == 2), -np.inf, np.log(0.5))
+
+    evidence = SetEvidence([beside], np.zeros((1, 3), dtype=bool))
+    selection = select_regions(evidence, ("a", "b", "c"), least=0.0)
+    assert selection.added.tolist() == [2]
+    assert selection.decrease.tolist() == [np.inf]
+
+
 def test_what_cannot_be_selected_by_is_refused() -> None:
     evidence, regions = rectangle_world()
     with pytest.raises(ValueError, match="at least one set, not 0"):
