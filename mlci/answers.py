@@ -24,6 +24,7 @@ from mlci.spaces import Bools, Ints
 from mlci.support import Support, support
 from mlci.tabular import TabularModel
 from mlci.temperature import TemperatureEstimate
+from mlci.ties import TieClass, tie_class
 
 # Demonstrations without a constraint would enter such a region in less than one set of this size
 # in 20, so that avoiding it says nothing.
@@ -45,6 +46,7 @@ class Answer:
         exact_ends: whether its trajectories begin and end at states, not at cells.
         temperature_estimate: the temperature that the demonstrations look like, if it is known.
         doubts: about the recordings themselves, such as `mlci.recordings.plausibility.summary`.
+        ties: the hypotheses that the demonstrations cannot tell from the first, if that is known.
         weights: soft or hard? What `mlci.soft_weight.estimate_weights` made of some regions.
         next_tasks: what to record next, as `mlci.next_task.next_tasks` chose it.
     """
@@ -58,6 +60,7 @@ class Answer:
     exact_ends: bool
     temperature_estimate: TemperatureEstimate | None = None
     doubts: tuple[str, ...] = ()
+    ties: TieClass | None = None
     weights: tuple[WeightEstimate, ...] = ()
     next_tasks: tuple[NextTask, ...] = ()
 
@@ -131,6 +134,7 @@ class Answer:
             "temperature_estimate": None
             if self.temperature_estimate is None
             else self.temperature_estimate.record(),
+            "tie_class": self.ties and self.ties.record(names),
             "weights": [estimate.record() for estimate in self.weights],
             "size_bias": None if self.size_bias is None else self.size_bias.record(),
             "next_tasks": [each.record(space) for each in self.next_tasks],
@@ -222,6 +226,7 @@ def answer(
         exact_ends=exact_ends,
         temperature_estimate=temperature,
         doubts=tuple(doubts),
+        ties=tie_class(model, inference, hypotheses),
         weights=tuple(weights),
         next_tasks=tuple(next_tasks),
     )
