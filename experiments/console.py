@@ -82,7 +82,7 @@ def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) 
     yield from entry("assumed", "; ".join(answer.assumptions))
     yield from entry("rests on", _carrier_words(answer))
     yield from entry("", _left_out_words(answer))
-    if answer.ties is not None and answer.ties.others:
+    if answer.ties is not None and len(answer.ties.others):
         yield from entry("ties", answer.ties.summary(names))
     for estimate in answer.weights:
         yield from entry("soft or hard?", f"region {estimate.region} {estimate}")

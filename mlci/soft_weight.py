@@ -149,7 +149,9 @@ class SoftShares:
             """The same, finite."""
             return max(log_likelihood(u), _IMPOSSIBLE)
 
-        best, lower, upper = likelihood_interval(searched, _UNIT, tolerance=1e-10)
+        each = soft_evidence(_WEIGHTS[:, None] / self.scale, self.table.T, inside, rates)
+        values = np.maximum(np.sum(each, axis=1), _IMPOSSIBLE)
+        best, lower, upper = likelihood_interval(searched, _UNIT, values, tolerance=1e-10)
         if log_likelihood(1.0) > log_likelihood(best) - TIE:  # where it is flat, a wall is simpler
             best = upper = 1.0
         return WeightEstimate(
@@ -165,18 +167,20 @@ class SoftShares:
         )
 
 
-def soft_evidence(weight: float, log_share: Floats, inside: Floats, rates: Rates = PAPER) -> Floats:
-    """l_j (N,) [nat]: log likelihood ratio of demonstrations under a weight to those under none.
+def soft_evidence(
+    weight: float | Floats, log_share: Floats, inside: Floats, rates: Rates = PAPER
+) -> Floats:
+    """l_j (..., N) [nat]: log likelihood ratio of demonstrations under a weight and under none.
 
     Args:
-        weight: w [nat/s], which may be infinite.
-        log_share: (N,) log A_j(w).
+        weight: w (..., 1) [nat/s], which may be infinite.
+        log_share: (..., N) log A_j(w).
         inside: (N,) how long each demonstration is inside [s].
         rates: model error and rule breaking.
     """
     eta, eps = rates.model_error, rates.rule_breaking
-    cost = np.multiply(weight, inside, where=inside > 0, out=np.zeros(inside.shape))
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cost = np.where(inside > 0, weight * inside, 0.0)
         log_a = np.logaddexp(np.log1p(-eta) + log_share, np.log(np.float64(eta)))
         return np.logaddexp(np.log1p(-eps) - cost - log_a, np.log(np.float64(eps)))
 

@@ -35,6 +35,7 @@ MLCI = {
     "mlci.systems": "mlci.differences",
     "mlci.system_check": "mlci.systems",
     "mlci.effort": "mlci.systems",
+    "mlci.strength": "mlci.systems",
     "mlci.simulate": "mlci.systems",
     "mlci.upwind": "mlci.compiled mlci.grids",
     "mlci.reachability": "mlci.regions mlci.system_check mlci.upwind",
@@ -112,7 +113,7 @@ MLCI = {
     "mlci.size_bias": "mlci.inference",
     "mlci.support": "mlci.inference",
     "mlci.misfit": "mlci.maxent",
-    "mlci.answers": "mlci.misfit mlci.next_task mlci.size_bias mlci.soft_weight mlci.support "
+    "mlci.answers": "mlci.next_task mlci.size_bias mlci.soft_weight mlci.support "
     "mlci.temperature mlci.ties",
     "mlci.metrics": "mlci.evidence",
     "mlci.task_outcomes": "mlci.evidence",

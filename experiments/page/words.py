@@ -64,6 +64,9 @@ def answer_sentences(answer: Answer) -> list[str]:
         )
     if len(credible.areas) > _AREAS:
         sentences.append(f"And {len(credible.areas) - _AREAS} more areas; see the table.")
+    if answer.ties is not None and len(answer.ties.others):
+        told = answer.ties.summary(regions.names)
+        sentences.append(f"{told[0].upper()}{told[1:]}.")
     return [*sentences, *_support_sentences(answer)]
 
 

@@ -18,6 +18,7 @@ from experiments.console import (
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
 from experiments.point.tables import point_tables
+from experiments.point.transfer_tables import transfer_tables
 from experiments.progress import begin
 from experiments.terminal import entry
 from experiments.tracking.store import Store
@@ -34,7 +35,8 @@ def run_point(
         log: called with each line for a reader.
 
     Returns:
-        Tables by name, see `experiments.point.tables.point_tables`.
+        Tables by name, see `experiments.point.tables.point_tables`; if asked for,
+        those of `transfer_tables`.
     """
     begin("ranking hypotheses")
     inferred = infer_point(settings, store)
@@ -58,6 +60,9 @@ def run_point(
     begin("measuring")
     measures = measure_point(settings, inferred)
     tables = point_tables(settings, inferred, measures, result.misfit)
+    if settings.transfer.strengths:
+        begin("with stronger and weaker controls")
+        tables |= transfer_tables(settings, inferred, store)
     begin("")
     for line in measure_lines(tables["summary"].iloc[0], tables["ranks"], top):
         log(line)

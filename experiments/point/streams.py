@@ -24,6 +24,8 @@ class Purpose(IntEnum):
     SETS = 7
     BASELINES = 8
     AREAS = 9
+    SOFT = 10
+    TRANSFER = 11
 
 
 def stream(seed: int, purpose: Purpose, *index: int) -> np.random.Generator:

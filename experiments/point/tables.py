@@ -16,6 +16,7 @@ from experiments.point.measures import Measures
 from experiments.point.next_task_tables import next_task_table
 from experiments.point.ranking_tables import rank_table, ranking_table
 from experiments.point.sets import set_tables
+from experiments.point.soft_tables import soft_table
 from experiments.point.streams import Purpose, stream
 from experiments.point.trajectory_tables import (
     probability_table,
@@ -51,7 +52,7 @@ def point_tables(
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
         `dimensions` of the state, and `regions` of the truth. If asked for, `sets` and
         `set_marginals`; `calibration`, and `evidence` and `forecasts` where these are calibrated;
-        `baselines`, `next_task`, and `areas` and `area_map`.
+        `baselines`, `next_task`, `soft`, and `areas` and `area_map`.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -92,6 +93,8 @@ def point_tables(
         tables |= area_tables(settings, point)
     if settings.next_task.repetitions:
         tables["next_task"] = next_task_table(settings, point)
+    if settings.soft.sets:
+        tables["soft"] = soft_table(settings, point)
     return tables
 
 

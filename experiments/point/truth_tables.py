@@ -17,6 +17,7 @@ TRUTH_TABLES = {
     "forecasts": ("cells", "actions", "dt", "samples"),
     "paths": ("truth", "seed"),
     "regions": ("truth",),
+    "transfer_values": ("truth",),
 }
 
 _PATH_EVERY = 5  # samples of a path between those that its table keeps

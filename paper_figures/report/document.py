@@ -25,7 +25,9 @@ from paper_figures.report import (
     section_origin,
     section_readings,
     section_rule_breaking,
+    section_soft,
     section_start_points,
+    section_transfer,
     section_wrong_model,
 )
 from paper_figures.report.earlier import changes
@@ -130,6 +132,20 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         "Areas: truths that are larger than any hypothesis",
         section_areas.section,
         (Figure("areas", "area_cover", "How well sets of hypotheses cover two ellipses."),),
+    ),
+    (
+        "Soft or hard?",
+        section_soft.section,
+        (Figure("soft", "soft_weights", "Weights of soft constraints: estimate against truth."),),
+    ),
+    (
+        "Failure set or tube?",
+        section_transfer.section,
+        (
+            Figure(
+                "transfer", "transfer", "A region, its tubes, and who is let in at other strengths."
+            ),
+        ),
     ),
     (
         "Calibration of the posterior",

@@ -12,6 +12,7 @@ from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
+from experiments.config.settings.constraint import SoftSettings, TransferSettings
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
@@ -133,6 +134,8 @@ class Settings(ModelSettings):
     baselines: BaselineSettings
     next_task: NextTaskSettings
     areas: AreaSettings
+    soft: SoftSettings
+    transfer: TransferSettings
     rollouts: Annotated[
         CountOrNone,
         about(
