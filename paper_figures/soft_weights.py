@@ -99,7 +99,7 @@ def _coverage(axes: plt.Axes, rows: pd.DataFrame) -> None:
     axes.axhline(95, color=GUIDE, linewidth=0.6, linestyle=":", zorder=0)
     for number, (_, some) in enumerate(rows.groupby("demonstrations")):
         for place, (_, each) in enumerate(some.groupby("truth")):
-            x = np.maximum(each["weight"], _LEAST) * _ASIDE ** (2 * number - 1 + 0.5 * place)
+            x = np.maximum(each["weight"], _LEAST) * _ASIDE ** (4 * number - 3 + 2 * place)
             value, low, high = (
                 100 * each[name] for name in ("covers", "covers_low", "covers_high")
             )

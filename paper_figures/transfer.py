@@ -11,7 +11,16 @@ from matplotlib.lines import Line2D
 from paper_figures.plane import Plane
 from paper_figures.report.means import share
 from paper_figures.rows import Unsuited
-from paper_figures.style import OTHER_MARKS, PAGE, RC, STEP_COLOURS, TRUTH, new_figure
+from paper_figures.style import (
+    GUIDE,
+    OTHER_MARKS,
+    PAGE,
+    PATH,
+    RC,
+    STEP_COLOURS,
+    TRUTH,
+    new_figure,
+)
 
 TABLES = {
     "transfer": (
@@ -92,10 +101,10 @@ def draw(
                     [(value - low).clip(0), (high - value).clip(0)],
                     **style,
                 )
-            axes.axvline(NOMINAL, color="#888888", linewidth=0.6, linestyle=":", zorder=0)
+            axes.axvline(NOMINAL, color=GUIDE, linewidth=0.6, linestyle=":", zorder=0)
             axes.set_ylim(-3, 103)
             axes.set_title(title)
-            axes.set_xlabel("control range / nominal")
+            axes.set_xlabel("controls [nominal range]")
             axes.set_ylabel(unit)
         handles, labels = grid[2].get_legend_handles_labels()
         handles += grid[0].get_legend_handles_labels()[0]
@@ -119,7 +128,7 @@ def _borders(axes: plt.Axes, values: pd.DataFrame, plane: Plane, regions: pd.Dat
             index="state_2", columns="state_1", values="value"
         )
         style = styles[number % len(styles)]
-        colour = "black" if strength == NOMINAL else "#555555"
+        colour = "black" if strength == NOMINAL else PATH
         axes.contour(
             table.columns,
             table.index,
@@ -146,7 +155,7 @@ def facts(
         "Orange: the truth. A region is inferred with the nominal control range and kept out of",
         "with others: by its own safe set, solved anew, or by the tube, the complement of its",
         "nominal safe set. Entries: random controls that pass the filter; refused: of states that",
-        "can keep out of the truth for ever. Lines: Wilson's 95 % intervals; dotted: nominal range.",
+        "can keep out for ever. Lines: Wilson's 95 % intervals; dotted: nominal range.",
         f"The inferred region is the truth in {int(right.sum())} of {len(right)} points.",
     ]
     for row in transfer_rows(transfer).itertuples():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from constraint_studies import soft_tables, transfer_tables
 from figure_study import cell_boxes, dimension_rows, path_rows, region_rows
 
 LIMITS = ("", "_low", "_high")
@@ -270,4 +271,6 @@ def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
         "forecast_diagram": forecast_tables(),
         "success": success_tables(),
         "success_cases": success_tables(),
+        "soft_weights": soft_tables(),
+        "transfer": transfer_tables(),
     }

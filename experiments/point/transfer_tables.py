@@ -86,7 +86,10 @@ class _Deployment:
         """The numbers of each method."""
         for method, strength in ((OWN, self.strength), (TUBE, NOMINAL)):
             safe_set = sets[strength]
-            margin = border_margin(WithStrength(self.settings.model, strength), safe_set, self.dt)
+            margin = self.settings.safety.margin
+            if margin is None:
+                system = WithStrength(self.settings.model, strength)
+                margin = border_margin(system, safe_set, self.dt)
             keep_out = SafetyFilter(self.system, safe_set, self.dt, margin)
             starts = self._starts(safe_set, margin)
             yield (

@@ -73,4 +73,4 @@ def _share(row: pd.Series, name: str) -> str:
     value, low, high = (row[f"{name}{end}"] for end in ("", "_low", "_high"))
     if pd.isna(value):
         return "-"
-    return between(f"{100 * value:.1f} %", f"{100 * low:.1f} %", f"{100 * high:.1f} %")
+    return between(f"{100 * value:.1f} %", f"{100 * max(low, 0.0):.1f} %", f"{100 * high:.1f} %")

@@ -500,10 +500,10 @@ def test_in_cell_sampling_counts_where_the_truth_is_found(results: Results) -> N
 def test_what_is_not_there_is_told_with_its_command(results: Results) -> None:
     text = report(results)
     studies = ("telescope", "sensitivity", "calibration", "in_cell", "readings", "wrong_model")
-    for study in (*studies, "rule_breaking", "control_noise"):
+    for study in (*studies, "rule_breaking", "control_noise", "soft", "transfer"):
         assert f"`python experiments/run.py -m experiment={study}` makes it." in text
     assert "`make benchmark` makes it." in text
-    assert text.count("Not there yet") == 10  # two sections read the study of calibration
+    assert text.count("Not there yet") == 12  # two sections read the study of calibration
     few = results.table("paper", "measures").query("cells != 900")
     write(results.folder, "paper", measures=few)
     with pytest.raises(Missing, match=r"no point with truth c1, 900 cells and dt 0\.1 s"):

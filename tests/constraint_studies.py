@@ -1,0 +1,66 @@
+"""Tables of two studies that were never run: soft constraints, and transfer to other controls."""
+
+import numpy as np
+import pandas as pd
+from figure_study import dimension_rows, region_rows
+
+
+def soft_tables() -> dict[str, pd.DataFrame]:
+    """Two truths: of ten estimates a weight, one misses it, and half are a wall where it is 16."""
+    rows = [
+        {
+            "truth": truth,
+            "weight": weight,
+            "demonstrations": size,
+            "set": k,
+            "estimate": np.inf if weight == 16 and k % 2 else weight + 0.1 * k,
+            "lower": weight + 1 if k == 9 else 0.5 * weight,
+            "upper": np.inf if weight == 16 else weight + 2,
+            "verdict": {0: "perhaps no constraint", 4: "soft", 16: "as a wall"}[weight],
+        }
+        for truth in ("c1", "c2")
+        for weight in (0, 4, 16)
+        for size in (10, 30)
+        for k in range(10)
+    ]
+    return {"soft": pd.DataFrame(rows)}
+
+
+def transfer_tables() -> dict[str, pd.DataFrame]:
+    """The tube lets in half of the trials with weak controls, and refuses half with strong ones."""
+    rows = [
+        {
+            "strength": strength,
+            "seed": seed,
+            "method": method,
+            "region": 5,
+            "right": True,
+            "safe": 100,
+            "refused": {"tube": 50 if strength > 1 else 10, "no filter": 0}.get(method, 10),
+            "doomed": 20,
+            "admitted": {"tube": 10 if strength < 1 else 0, "no filter": 20}.get(method, 0),
+            "trials": np.nan if method == "never entered" else 200,
+            "entered": {"tube": 100 if strength < 1 else 0, "no filter": 150}.get(method, 0)
+            if method != "never entered"
+            else np.nan,
+        }
+        for strength in (0.5, 1.0, 2.0)
+        for seed in (0, 1)
+        for method in ("own safe set", "tube", "no filter", "never entered")
+    ]
+    angle, speed = np.meshgrid(np.linspace(0, 2 * np.pi, 9), np.linspace(-2, 2, 7), indexing="ij")
+    values = [
+        pd.DataFrame(
+            {
+                "truth": "c1",
+                "strength": strength,
+                "state_1": angle.ravel(),
+                "state_2": speed.ravel(),
+                "value": (np.abs(angle - np.pi) - np.abs(speed) / strength).ravel(),
+            }
+        )
+        for strength in (0.5, 1.0, 2.0)
+    ]
+    of_truth = {"regions": region_rows(), "dimensions": dimension_rows()}
+    one = {name: table[table["truth"] == "c1"] for name, table in of_truth.items()}
+    return {"transfer": pd.DataFrame(rows), "transfer_values": pd.concat(values), **one}
