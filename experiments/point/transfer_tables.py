@@ -18,7 +18,7 @@ import pandas as pd
 import mlci.reachability
 from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
-from experiments.point.stages import corners, system_module
+from experiments.point.stages import region_inputs, shape_modules, system_module
 from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
 from mlci.control_problem import ControlFilter, NoFilter
@@ -154,8 +154,10 @@ def _solved(settings: Settings, store: Store, region: Regions, strength: float) 
         safe = solve_safe_set(WithStrength(settings.model, strength), grid, region)
         return {"values": safe.values, "gradients": safe.gradients}
 
-    inputs = (settings.system, corners(region), settings.safety.shape, strength)
+    of_region = region.names, region_inputs(settings, region)
+    inputs = (settings.system, of_region, settings.safety.shape, strength)
     modules = [mlci.reachability, system_module(settings.model), sys.modules[__name__]]
+    modules += shape_modules(settings, region)
     stored = store.get("deployed_safe_set", inputs, modules, compute)
     return SafeSet(grid, stored["values"], stored["gradients"])
 
