@@ -269,7 +269,7 @@ def full_disk(base: Path) -> None:
 
 
 def overhead(base: Path, limit: float = 1.0) -> None:
-    """Wall time of 200 trivial points with 2 workers, beyond their own work.
+    """Wall time of 100 trivial points with 2 workers, beyond their own work.
 
     Half a second a point was measured beside another process on two cores; twice that is
     an error anywhere.
@@ -277,15 +277,15 @@ def overhead(base: Path, limit: float = 1.0) -> None:
     folder = base / "overhead"
     folder.mkdir()
     began = time.monotonic()
-    process = start(folder, "-m", "temperature=range(1,201)", "study=s", "workers=2")
+    process = start(folder, "-m", "temperature=range(1,101)", "study=s", "workers=2")
     out, err = process.communicate(timeout=600)
     wall = time.monotonic() - began
     assert process.returncode == 0, f"{out}\n{err}"
     records = [json.loads(path.read_bytes()) for path in folder.rglob("record.json")]
-    assert len(records) == 200
+    assert len(records) == 100
     work = sum(record["seconds"]["total"] for record in records)
-    each = (wall - work / 2) / 200
-    print(f"overhead: {wall:.1f} s for 200 points, {work:.1f} s of it work: {each:.3f} s a point")
+    each = (wall - work / 2) / 100
+    print(f"overhead: {wall:.1f} s for 100 points, {work:.1f} s of it work: {each:.3f} s a point")
     assert each < limit
 
 
