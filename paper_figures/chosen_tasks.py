@@ -45,7 +45,7 @@ def draw(unfound: pd.DataFrame, chosen_tasks: pd.DataFrame) -> Figure:
     sources = [source for source in WORDS if (rows["source"] == source).any()]
     figure, grid = new_figure(
         PAGE,
-        0.5 + 1.4 * len(sources),
+        0.5 + 1.75 * len(sources),
         nrows=len(sources),
         ncols=len(truths),
         sharex=True,

@@ -42,8 +42,6 @@ def chosen_tasks(next_task: pd.DataFrame) -> pd.DataFrame:
     for opening, group in _groups(next_task):
         counts = _resampled(group, list(map(str, opening.values())))
         for until in EVENTS:
-            if not group[until].notna().any():
-                continue
             longest, values = int(group["tried"].max()), dict[str, Floats]()
             for way in WAYS:
                 curve = _curve(group[group["way"] == way], until, counts, longest)
@@ -74,8 +72,6 @@ def unfound(next_task: pd.DataFrame) -> pd.DataFrame:
     for opening, group in _groups(next_task):
         counts = _resampled(group, list(map(str, opening.values())))
         for until in EVENTS:
-            if not group[until].notna().any():
-                continue
             for way in WAYS:
                 picked = group[group["way"] == way]
                 curve = _curve(picked, until, counts, int(group["tried"].max()))

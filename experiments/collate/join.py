@@ -163,8 +163,9 @@ def _made_tables(
         made["baseline_differences"] = baseline_differences(pd.read_csv(joined["baselines"]))
     if "next_task" in joined:
         table = pd.read_csv(joined["next_task"])
-        made["chosen_tasks"], made["unfound"] = chosen_tasks(table), unfound(table)
-        made["early_overlap"] = early_overlap(table)
+        if len(table):
+            made["chosen_tasks"], made["unfound"] = chosen_tasks(table), unfound(table)
+            made["early_overlap"] = early_overlap(table)
     cases = case_table(joined["summary"], [point.identity for point in points], names)
     return made if cases is None else {**made, "cases": cases}
 

@@ -67,16 +67,16 @@ def next_task_table(settings: Settings, point: PointInference) -> pd.DataFrame:
             order = rng.permutation(len(pool.outcomes))[: settings.next_task.pool]
             shown, most = pool.shown(repetition), min(settings.next_task.most, len(order))
             for way, picked in (
-                ("chosen", _chosen(pool.outcomes, shown, order, most)),
+                ("chosen", chosen_order(pool.outcomes, shown, order, most)),
                 ("random", order[:most]),
             ):
                 opening = {"source": source, "repetition": repetition, "way": way, "tried": most}
-                found = _found(shown.of(picked), shown.hypotheses.inside(settings.constraint))
+                found = found_after(shown.of(picked), shown.hypotheses.inside(settings.constraint))
                 rows.append({**opening, **found, **_early(settings, shown.of(picked[:EARLY]))})
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _chosen(outcomes: list[TaskOutcomes], shown: Inference, pool: Ints, most: int) -> Ints:
+def chosen_order(outcomes: list[TaskOutcomes], shown: Inference, pool: Ints, most: int) -> Ints:
     """The tasks of a pool in the order in which they are chosen, `most` of them."""
     left = pool.tolist()
     picked: list[int] = []
@@ -90,7 +90,7 @@ def _chosen(outcomes: list[TaskOutcomes], shown: Inference, pool: Ints, most: in
     return np.array(picked, dtype=np.int64)
 
 
-def _found(inference: Inference, truth: Bools) -> dict[str, float]:
+def found_after(inference: Inference, truth: Bools) -> dict[str, float]:
     """After how many of the demonstrations, in their order, the truth (C,) is found."""
     count = len(inference.names)
     if not (count and truth.any()):
