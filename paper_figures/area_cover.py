@@ -96,7 +96,8 @@ def facts(
     """What the caption says."""
     lines = [
         f"Left: share of random subsets of {shown_size(area_map)} demonstrations in whose set a "
-        "hypothesis is (posterior of the set, climbed); outlined: the truth.",
+        "hypothesis is (posterior of the set, climbed); outlined: boxes that hold the regions of "
+        "the truth, each of which may be smaller than its box.",
         "Right: intersection over union with the truth; bands: 95 % bootstrap intervals over seeds "
         f"and subsets; dotted: {AIM:g}.",
     ]
