@@ -65,7 +65,7 @@ lint: $(READY) ## check style, formatting and types
 	$(BIN)/ruff format --check
 	$(BIN)/mypy mlci experiments
 
-# SCALE=6d runs one task in six dimensions instead, which takes hours.
+# SCALE=6d runs one task in six dimensions instead, of which every core takes a part.
 benchmark: $(READY) ## time the project against other packages and floors
 	$(BIN)/python -m tests.benchmark$(if $(SCALE),.$(SCALE:6d=six_dimensions))
 

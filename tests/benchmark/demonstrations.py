@@ -22,7 +22,7 @@ from tests.benchmark.contest import OURS, Contender, Contest, Work
 SYSTEM, DT, STEPS, WEIGHT, GUESSES = Pendulum(), 0.01, 500, 300.0, 3
 _TOLERANCE = 1e-9  # share of the cost by which an iteration must gain
 _ALLOWED = 0.01  # by how much the mean cost may be above the best that is known
-_OURS, _CROCODDYL = 4, 3  # iterations, as few as `_ALLOWED` takes
+ITERATIONS, _CROCODDYL = 4, 3  # iterations, as few as `_ALLOWED` takes
 _MANY = 60  # iterations after which nothing changes
 
 
@@ -39,11 +39,11 @@ def _problem() -> tuple[Floats, Floats, Floats]:
     return starts, goals, np.concatenate([trial.guesses for trial in trials])[:, :, 0]
 
 
-def _solve(members: slice, iterations: int) -> Floats:
+def solve(members: slice, iterations: int, system: Pendulum = SYSTEM) -> Floats:
     """Costs of some members by this project."""
     starts, goals, guesses = (each[members] for each in _problem())
     return optimize(
-        SYSTEM,
+        system,
         starts,
         goals,
         goals,
@@ -81,11 +81,11 @@ def _contest(name: str, members: slice) -> Contest:
     some, few, one = (slice(0, min(count, most)) for most in (60, 15, GUESSES))
 
     def ours() -> Work:
-        return lambda: _solve(members, _OURS)
+        return lambda: solve(members, ITERATIONS)
 
     def plain_loops() -> Work:
         starts, goals, guesses = (each[members] for each in _problem())
-        return lambda: loops.ilqr_batch(starts, goals, guesses, DT, WEIGHT, _OURS, _TOLERANCE)
+        return lambda: loops.ilqr_batch(starts, goals, guesses, DT, WEIGHT, ITERATIONS, _TOLERANCE)
 
     return Contest(
         "demonstrations",
@@ -215,7 +215,7 @@ def _textbook(start: Floats, goal: Floats, u: Floats) -> float:
 
     x, u, cost = roll_out(np.zeros(STEPS), np.zeros((STEPS, 2)), np.zeros((STEPS, 2)), u)
     damping, by_control = 0.0, np.array([0.0, DT])
-    for _ in range(_OURS):
+    for _ in range(OURS):
         slope, bend = 2 * WEIGHT * (x[-1] - goal), 2 * WEIGHT * np.eye(2)
         shift, gain = np.empty(STEPS), np.empty((STEPS, 2))
         for k in reversed(range(STEPS)):

@@ -141,9 +141,9 @@ def infer_one(model: Any, size: Size, start: Floats, goal: Box) -> tuple[list[fl
     clock = [time.process_time()]
     where = int(model.grid.index(start)), model.grid.cells_in(goal)
     distribution = TrajectoryDistribution(model, *where, size.steps)
-    phi = distribution.violation_probabilities()  # and log Z, in one pass
+    avoidance = distribution.avoidance_probabilities()  # and log Z, in one pass
     clock.append(time.process_time())
-    rank_constraints(phi[None], np.zeros((1, len(phi)), dtype=bool))
+    rank_constraints(avoidance[None], np.zeros((1, len(avoidance)), dtype=bool))
     clock.append(time.process_time())
     active = np.sum(distribution.log_z > -np.inf, axis=1)
     return np.diff(clock).tolist(), int(active.sum()), int(active.max())
@@ -157,8 +157,8 @@ def infer_many(model: Any, size: Size) -> tuple[list[float], int, int]:
     clock = [time.process_time()]
     prepared = prepare(model, tasks)
     clock.append(time.process_time())
-    phi = 1 - prepared.avoidance
-    rank_constraints(phi, np.zeros(phi.shape, dtype=bool))
+    avoidance = prepared.avoidance
+    rank_constraints(avoidance, np.zeros(avoidance.shape, dtype=bool))
     clock.append(time.process_time())
     return np.diff(clock).tolist(), 0, 0
 

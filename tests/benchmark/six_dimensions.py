@@ -66,15 +66,17 @@ def main(words: list[str]) -> int:
         processes,
     )
     distribution = TrajectoryDistribution.of_task(model, task, exact_ends=True)
-    phi = distribution.violation_probabilities()
+    avoidance = distribution.avoidance_probabilities()
     log_z = float(distribution.log_z[0, distribution.start])
     active = np.any(distribution.log_z > -np.inf, axis=0).sum()
     _report(
         f"log Z {log_z:.3f} nat over {distribution.steps} steps, {active} active cells", processes
     )
-    ranking = rank_constraints(phi[None], np.zeros((1, len(phi)), dtype=bool))
+    ranking = rank_constraints(avoidance[None], np.zeros((1, len(avoidance)), dtype=bool))
+    first = ranking.order[0]
     _report(
-        f"{len(phi)} hypotheses ranked, first {ranking.order[0]} with {np.max(phi):.3f}", processes
+        f"{len(avoidance)} hypotheses ranked, first {first} with Phi {1 - avoidance[first]:.3f}",
+        processes,
     )
     return int(_memory(processes) > MOST_MEMORY)
 

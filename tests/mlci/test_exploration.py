@@ -11,8 +11,8 @@ from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
 from mlci.simulate import rollout
-from mlci.spaces import Box
-from mlci.systems import Pendulum
+from mlci.spaces import Box, StateSpace
+from mlci.systems import FunctionSystem, Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize
 from tests.benchmark.two_link_arm import TwoLinkArm
 
@@ -69,6 +69,31 @@ def test_another_task_is_refused(exact_ends: bool) -> None:
     explored = explore(MODEL, TASKS[1:], exact_ends=exact_ends)
     with pytest.raises(ValueError, match=r"for other tasks than that from cell \d+ in 5 steps"):
         _ = TrajectoryDistribution.of_task(explored, TASKS[0], exact_ends=exact_ends).reachable
+
+
+def test_cells_too_far_from_the_goal_are_passed_over() -> None:
+    every, near = (
+        explore(MODEL, TASKS, bounded=bounded).explored.cells for bounded in (False, True)
+    )
+    assert np.all(every[near])
+    assert near.sum() < every.sum()
+
+
+def test_dynamics_that_change_too_much_within_a_cell_are_told() -> None:
+    """A gust between the centres of cells, which no bound from the centres can know of."""
+
+    def rates(x, u):
+        gust = np.where(np.abs((x[..., 0] % 1.0) - 0.25) < 0.1, 3.0, 0.0)
+        return (0.1 * u[..., 0] + gust,)
+
+    space = StateSpace(Box([0.0], [20.0]), [False], ("place",))
+    line = FunctionSystem(rates, space, Box([-1.0], [1.0]))
+    regions = Regions.from_grid(space, (4,))
+    model = TabularModel(line, Grid(space, (20,)), np.array([[-1.0], [1.0]]), 0.9, regions, 2)
+    task = Task([3.4], Box([2.0], [8.0]), 1.8)
+    with pytest.raises(ValueError, match=r"moves of cell \d+ lead further than those from"):
+        explore(model, [task])
+    assert explore(model, [task], bounded=False).explored.cells.sum() > 1
 
 
 def test_one_step_between_states() -> None:
