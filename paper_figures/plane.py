@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -11,11 +12,33 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.patches import Rectangle
+from matplotlib.path import Path
+from matplotlib.transforms import IdentityTransform, Transform
 
 from paper_figures.rows import Unsuited
 from paper_figures.style import EDGE
 
 _TURN_TICKS = {0.0: "0", 0.25: r"$\pi/2$", 0.5: r"$\pi$", 0.75: r"$3\pi/2$", 1.0: r"$2\pi$"}
+
+
+class Shaped(Rectangle):
+    """The outline of a region that is no box, in place of the rectangle around it.
+
+    Attributes:
+        rings: closed polylines (P, 2) in the plane; holes run the other way round.
+    """
+
+    def __init__(self, *size: Any, rings: list[np.ndarray], **style: Any) -> None:
+        super().__init__(*size, **style)
+        self.rings = rings
+
+    def get_path(self) -> Path:
+        """The rings, in the coordinates of the axes."""
+        return Path.make_compound_path(*(Path(ring, closed=True) for ring in self.rings))
+
+    def get_patch_transform(self) -> Transform:
+        """None: rings lie where they are drawn."""
+        return IdentityTransform()
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +67,10 @@ class Plane:
         return cls(*(dimensions.iloc[place] for place in sorted(order)))
 
     def rectangles(self, boxes: pd.DataFrame) -> list[Rectangle]:
-        """Each box, of columns lower_<d> and upper_<d>; a free side spans the axis."""
+        """Each box, of columns lower_<d> and upper_<d>; a free side spans the axis.
+
+        A region that is no box has rings in the column `outline`, and is drawn by them.
+        """
         corners = [
             boxes[[f"{side}_{self.x['name']}", f"{side}_{self.y['name']}"]].to_numpy(dtype=float)
             for side in ("lower", "upper")
@@ -53,7 +79,14 @@ class Plane:
             np.where(np.isfinite(corner), corner, [self.x[side], self.y[side]])
             for corner, side in zip(corners, ("lower", "upper"), strict=True)
         )
-        return [Rectangle(tuple(a), *(b - a)) for a, b in zip(lower, upper, strict=True)]
+        outlines = boxes.get("outline", pd.Series("", boxes.index)).fillna("")
+        names = [self.x["name"], self.y["name"]]
+        return [
+            Shaped(tuple(a), *(b - a), rings=rings)
+            if text and (rings := outline_rings(text, names))
+            else Rectangle(tuple(a), *(b - a))
+            for a, b, text in zip(lower, upper, outlines, strict=True)
+        ]
 
     def line(self, path: pd.DataFrame) -> np.ndarray:
         """(K, 2) the points of a path, with a row of NaN wherever a periodic dimension wraps."""
@@ -119,7 +152,13 @@ class Plane:
 def _copies(
     box: Rectangle, column: int, dimension: pd.Series, period: float
 ) -> Iterator[Rectangle]:
-    """A box and those of its copies, a period before and after, that reach into the bounds."""
+    """A box and those of its copies, a period before and after, that reach into the bounds.
+
+    The rings of a region that is no box are all of them.
+    """
+    if isinstance(box, Shaped):
+        yield box
+        return
     size = (box.get_width(), box.get_height())
     slack = 1e-5 * period  # tables round corners
     for turns in (0, -1, 1):
@@ -128,6 +167,14 @@ def _copies(
         inside = corner[column] < dimension["upper"] - slack
         if inside and corner[column] + size[column] > dimension["lower"] + slack:
             yield Rectangle(tuple(corner), *size)
+
+
+def outline_rings(text: str, names: list[str]) -> list[np.ndarray]:
+    """The rings of an outline in a table, if it is one in the plane of two dimensions."""
+    written = json.loads(text)
+    if written["dimensions"] != names:
+        return []
+    return [np.array(ring, dtype=float) for ring in written["rings"]]
 
 
 def centre(box: Rectangle) -> tuple[float, float]:
@@ -142,15 +189,11 @@ def axis_label(dimension: pd.Series) -> str:
 
 def outline(box: Rectangle, colour: str, width: float, **options: Any) -> Rectangle:
     """The border of a box, above what fills it."""
-    return Rectangle(
-        box.get_xy(),
-        box.get_width(),
-        box.get_height(),
-        fill=False,
-        edgecolor=colour,
-        linewidth=width,
-        **{"zorder": 4, **options},
-    )
+    style: dict[str, Any] = {"fill": False, "edgecolor": colour, "linewidth": width, "zorder": 4}
+    size = box.get_xy(), box.get_width(), box.get_height()
+    if isinstance(box, Shaped):
+        return Shaped(*size, rings=box.rings, **{**style, **options})
+    return Rectangle(*size, **{**style, **options})
 
 
 def numbered(axes: Axes, box: Rectangle, number: float, size: float = 7) -> None:

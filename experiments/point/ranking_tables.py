@@ -7,12 +7,13 @@ import pandas as pd
 from scipy.special import expit, logit
 
 from experiments.config.settings import Settings
-from experiments.point.truth_tables import box_table
+from experiments.point.truth_tables import region_table
 from mlci.best_areas import area_scores
 from mlci.credible_sets import neighbours
 from mlci.evidence import prior_shares, total_gain
 from mlci.inference import UNAVOIDABLE, Inference
 from mlci.metrics import claims, random_subsets, top_chances, truth_ranks
+from mlci.planes import planes
 from mlci.region_sizes import weights_by_size
 from mlci.rule_breaking import gains_of_subsets
 from mlci.spaces import Floats, Ints
@@ -90,7 +91,7 @@ def ranking_table(inference: Inference) -> pd.DataFrame:
     prior = prior_shares(len(hypotheses), inference.prior_none, weights)
     return pd.DataFrame(
         {
-            **box_table("hypothesis", hypotheses),
+            **region_table("hypothesis", hypotheses, planes(hypotheses)[0]),
             "feasible": ranking.feasible,
             "violating_demonstrations": np.sum(inference.violated, axis=0),
             "outcome": inference.outcomes,

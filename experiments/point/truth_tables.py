@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
 from experiments.point.trials import TrialSet
+from mlci.outlines import outline
+from mlci.planes import Plane, planes, simplified
 from mlci.regions import Regions
+from mlci.shapes import Shape
 from mlci.spaces import Ints, StateSpace
 
 # Collate keeps one copy of each, opened by these columns alone.
@@ -20,6 +25,7 @@ TRUTH_TABLES = {
     "transfer_values": ("truth",),
 }
 
+_OUTLINE = 1e-3  # of the bounds, by which an outline may be off
 _PATH_EVERY = 5  # samples of a path between those that its table keeps
 
 
@@ -53,20 +59,38 @@ def truth_tables(settings: Settings, trials: TrialSet, numbers: Ints) -> dict[st
             }
         ),
         "dimensions": dimension_table(space),
-        "regions": box_table("region", settings.constraint),
+        "regions": region_table("region", settings.constraint, planes(settings.candidates)[0]),
     }
 
 
-def box_table(what: str, boxes: Regions) -> pd.DataFrame:
-    """A row a box, numbered in the column `what`: its corners, infinite where it is free."""
-    names = boxes.space.names
-    return pd.DataFrame(
+def region_table(what: str, regions: Regions, plane: Plane) -> pd.DataFrame:
+    """A row a region, numbered in the column `what`: its corners, infinite where it is free.
+
+    Where some region is no box its corners are those of its hull, and the column `outline` has its
+    rings in a plane, as JSON.
+    """
+    names = regions.space.names
+    table = pd.DataFrame(
         {
-            what: np.arange(len(boxes)),
-            **{f"lower_{name}": boxes.lower[:, k] for k, name in enumerate(names)},
-            **{f"upper_{name}": boxes.upper[:, k] for k, name in enumerate(names)},
+            what: np.arange(len(regions)),
+            **{f"lower_{name}": regions.lower[:, k] for k, name in enumerate(names)},
+            **{f"upper_{name}": regions.upper[:, k] for k, name in enumerate(names)},
         }
     )
+    if not regions.are_boxes.all():
+        table["outline"] = [_outline(plane, shape) for shape in regions.shapes]
+    return table
+
+
+def _outline(plane: Plane, shape: Shape | None) -> str:
+    """The outline of a region that is no box; nothing of one that is, or of a state of one
+    dimension."""
+    if shape is None or plane.y is None:
+        return ""
+    tolerance = _OUTLINE * float(np.min(plane.space.bounds.widths[[plane.x, plane.y]]))
+    rings = [simplified(ring, tolerance) for ring in outline(plane, shape)]
+    names = [plane.space.names[plane.x], plane.space.names[plane.y]]
+    return json.dumps({"dimensions": names, "rings": [np.round(r, 6).tolist() for r in rings]})
 
 
 def dimension_table(space: StateSpace) -> pd.DataFrame:

@@ -110,6 +110,19 @@ def test_noise_is_averaged_and_borders_tolerated() -> None:
     assert not RANGES.applied_by(CART, burst, 0.5).any()
 
 
+def test_window_that_ends_with_a_sample_counts() -> None:
+    times = np.array([0.0, 0.4, 0.7, 1.1])
+    path = Demonstration(
+        Task(np.zeros(2), Box.point(np.zeros(2)), 1.1),
+        np.zeros((4, 2)),
+        np.array([[0.8], [1.0], [0.0]]),
+        times,
+    )
+    # From 0.2 to 0.7 s the mean is 0.92; of windows that begin with a sample, 0.84 at most.
+    ranges = ControlRanges([[0.9], [0.93]], [[np.inf], [np.inf]])
+    assert ranges.applied_by(CART, path, 0.5).tolist() == [True, False]
+
+
 def test_limit_is_what_a_range_leaves() -> None:
     box = Box([-1.0, -2.0], [1.0, 2.0])
     free = np.inf

@@ -86,6 +86,8 @@ def test_constant_controls_achieve_what_is_claimed_before_a_ball():
             least = np.minimum(least, ball.signed_distance(now))
         achieved = np.maximum(achieved, least)
     assert np.all(claimed <= achieved + 1e-3)
+    # Ten times longer steps lose more, and claim no more: levels between samples are bounded.
+    assert np.all(escape_value(system, ball, states, 3.0, 0.25) <= achieved + 1e-3)
     assert np.mean(achieved - claimed) < 0.01
     grid = Grid(system.space, (31, 31))
     table = tabulate_escapes(system, grid, ball, horizon=3.0)
