@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from types import ModuleType
 
@@ -11,8 +12,10 @@ import pytest
 from figure_study import path_rows
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from paper_figures import hypothesis_map
+from paper_figures.plane import Plane, centre, outline
 from paper_figures.rows import Unsuited
 from paper_figures.style import TRUTH
 
@@ -47,3 +50,27 @@ def test_one_dimension_has_no_plane(tables_for: TablesFor) -> None:
     tables["example_dimensions"] = tables["example_dimensions"].head(1)
     with pytest.raises(Unsuited, match="a state of one dimension has no plane"):
         hypothesis_map.draw(**tables)
+
+
+def test_region_that_is_no_box_is_drawn_by_its_rings() -> None:
+    axis = {"unit": "m", "lower": 0.0, "upper": 4.0, "periodic": True}
+    plane = Plane(pd.Series({"name": "x", **axis}), pd.Series({"name": "y", **axis}))
+    ring = [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 1.0]]
+    elsewhere = {"dimensions": ["x", "z"], "rings": [ring]}
+    triangle = {"dimensions": ["x", "y"], "rings": [ring]}
+    regions = pd.DataFrame(
+        {
+            **{f"lower_{name}": [1.0, 1.0, 3.5] for name in "xy"},
+            **{f"upper_{name}": [2.0, 2.0, 4.5] for name in "xy"},
+            "outline": [json.dumps(triangle), json.dumps(elsewhere), np.nan],
+        }
+    )
+    shaped, hull, box = plane.rectangles(regions)
+    for drawn in (shaped, outline(shaped, "black", 1.0)):
+        vertices = drawn.get_transform().transform_path(drawn.get_path()).vertices
+        np.testing.assert_array_equal(vertices, ring)
+    assert centre(shaped) == (1.5, 1.5)  # where its rank is written
+    for each in (hull, box):
+        assert type(each) is Rectangle
+    assert len(plane.regions(regions.iloc[:1])) == 1  # rings have no copies, and boxes do
+    assert len(plane.regions(regions.iloc[2:])) == 4
