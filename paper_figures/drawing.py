@@ -134,7 +134,8 @@ def draw_studies(
     parallel = Parallel(n_jobs=jobs, return_as="generator")
     usual = signal.signal(signal.SIGINT, signal.SIG_IGN)  # inherited by workers: joblib stops them
     try:
-        parts = parallel(delayed(_draw)(study, name) for study in changed for name in FIGURES)
+        tasks = [delayed(_draw)(study, name) for study in changed for name in FIGURES]
+        parts = parallel(tasks) if tasks else iter(())  # joblib warns of what nobody asks for
     finally:
         signal.signal(signal.SIGINT, usual)
     for study in studies:
