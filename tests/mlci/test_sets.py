@@ -310,3 +310,35 @@ def test_what_does_not_fit_is_refused() -> None:
     demonstrations, inference = inferred(model)
     with pytest.raises(ValueError, match="1 demonstrations and 30 regions do not fit"):
         infer_sets(model, demonstrations[:1], inference)
+
+
+@pytest.mark.parametrize("worlds", [60, pytest.param(500, marks=pytest.mark.long)])
+def test_beliefs_come_true_as_often_as_they_are_probable(worlds: int) -> None:
+    """Truths drawn from the prior, and paths from the trajectories that avoid them: over all worlds
+    and regions, as many are forbidden as marginals say, in each third of the probabilities."""
+    marginals, forbidden = [], []
+    for world in range(worlds):
+        rng = np.random.default_rng([7, world])
+        table = random_table(rng, states=6, actions=3, regions=4, cost=1.0)
+        everything, crosses = trajectories(table, steps=4), table.crosses.toarray()
+        weights = np.array([weight for weight, _, _ in everything])
+        crossed = np.array([crosses[rows].any(axis=0) for _, _, rows in everything])
+        if not len(weights):
+            continue
+        truth = np.zeros(4, dtype=bool)
+        truth[rng.choice(4, rng.choice(5, p=ALL.sizes), replace=False)] = True
+        allowed = weights * ~crossed[:, truth].any(axis=1)
+        if not allowed.sum() > 0:
+            continue  # a truth that allows no path has no likelihood either
+        paths = rng.choice(len(weights), size=2, p=allowed / allowed.sum())
+        beside = partial(FixedHorizon(table, steps=4).log_avoidance_beside, 0)
+        posterior = enumerate_sets(SetEvidence([beside] * 2, crossed[paths]), ALL)
+        marginals.append(posterior.marginal)
+        forbidden.append(truth)
+    p, hit = np.ravel(marginals), np.ravel(forbidden)
+    assert len(marginals) > worlds / 3
+    for low, high in ((0, 0.2), (0.2, 0.45), (0.45, 1)):
+        some = (p >= low) & (p <= high)
+        # Three deviations, if regions of a world were independent of each other.
+        deviation = np.sqrt(np.sum(p[some] * (1 - p[some])))
+        assert abs(np.sum(hit[some] - p[some])) < 3 * deviation + 1e-9
