@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mlci.balls import Ball
+from mlci.closest_approach import KeepOut
 from mlci.constant_controls import escape_value, tabulate_escapes
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.grids import Grid
@@ -92,6 +93,17 @@ def test_constant_controls_achieve_what_is_claimed_before_a_ball():
     grid = Grid(system.space, (31, 31))
     table = tabulate_escapes(system, grid, ball, horizon=3.0)
     np.testing.assert_array_equal(table.values[ball.signed_distance(grid.centers) < 0] < 0, True)
+
+
+def test_bound_between_two_samples_is_below_the_least_level_on_the_way():
+    ball = Regions.from_shapes(PLANE, [Ball([0.0, 0.0], 0.3)])
+    ends = np.asfortranarray([[-1.0, 0.0]]), np.asfortranarray([[1.0, 0.0]])
+    rates = np.asfortranarray([[2.0, 0.0]])
+    distance, least = ball.signed_distance(ends[0]), np.array([np.inf])
+    KeepOut.of(ball).approach(ends, (rates, rates), 1.0, distance, least)
+    assert least[0] <= -0.3  # in the middle
+    assert least[0] > -0.3 - 2 / 8
+    np.testing.assert_array_equal(distance, ball.signed_distance(ends[1]))
 
 
 def test_a_demonstrator_goes_round_two_ellipses():
