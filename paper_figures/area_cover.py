@@ -81,7 +81,7 @@ def draw(
         right.set_xticks(sizes, labels=[str(size) for size in sizes])
         right.set_ylim(0, 1)
         right.set_xlabel("demonstrations")
-        right.set_ylabel("overlap with the truth (IoU)")
+        right.set_ylabel("overlap with the truth, IoU [1]")
         right.legend(loc="upper left")
     return figure
 

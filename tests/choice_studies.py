@@ -259,6 +259,30 @@ def wrong_model_tables() -> dict[str, pd.DataFrame]:
     }
 
 
+def area_cover_tables() -> dict[str, pd.DataFrame]:
+    """Four squares, one method better than the next."""
+    methods, sizes = ["single", "neighbourhood", "greedy", "climb"], [1, 2, 4]
+    curve = [
+        {"demonstrations": size, "method": name, "iou": iou, "iou_low": iou - 0.05}
+        | {"iou_high": iou + 0.05}
+        for k, name in enumerate(methods)
+        for size in sizes
+        for iou in [0.1 + 0.1 * k + 0.05 * size]
+    ]
+    cell = pd.DataFrame({"seed": 0, "hypothesis": range(4)})
+    corner = {"lower_x": [0.0, 1, 0, 1], "lower_y": [0.0, 0, 1, 1]}
+    boxes = cell.assign(**corner, upper_x=[1.0, 2, 1, 2], upper_y=[1.0, 1, 2, 2])
+    truth = {"truth": "t", "region": 0, "lower_x": 0.2, "lower_y": 0.2}
+    of_x = {"truth": "t", "unit": "m", "lower": 0.0, "upper": 2.0, "periodic": False}
+    return {
+        "area_curve": pd.DataFrame(curve),
+        "area_map": cell.assign(in_truth=[0.6, 0, 0, 0], climb_4=[0.8, 0.2, 0.0, 0.0]),
+        "hypotheses": boxes,
+        "regions": pd.DataFrame([truth | {"upper_x": 0.9, "upper_y": 0.9}]),
+        "dimensions": pd.DataFrame([{"name": name, **of_x} for name in "xy"]),
+    }
+
+
 def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
     """The tables that each figure of a choice is drawn from, by its module."""
     return {
@@ -273,4 +297,5 @@ def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
         "success_cases": success_tables(),
         "soft_weights": soft_tables(),
         "transfer": transfer_tables(),
+        "area_cover": area_cover_tables(),
     }
