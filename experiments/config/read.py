@@ -133,7 +133,10 @@ def read_table_config(tree: Mapping[str, Any]) -> TableSettings:
     # Of the kind of evidence, the rates alone: a table has no cells and no demonstrator.
     rates = tree.get("inference")
     if isinstance(rates, Mapping):
-        tree = {**tree, "inference": _without(rates, ("exact_ends", "calibrate"))}
+        tree = {
+            **tree,
+            "inference": _without(rates, ("exact_ends", "calibrate", "size_prior", "sets")),
+        }
     return checked(TableSettings, tree)
 
 
