@@ -12,7 +12,7 @@ from mlci.answers import Answer, listed
 from mlci.demonstrations import Task
 from mlci.diagnosis import Diagnosis
 from mlci.inference import Inference
-from mlci.sets import SetPosterior
+from mlci.sets.posterior import SetPosterior
 from mlci.spaces import Box, StateSpace
 
 _AREAS, _CARRIERS, _MARGINALS = 3, 4, 5  # that are printed

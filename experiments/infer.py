@@ -54,7 +54,7 @@ from mlci.recordings.files import user_path
 from mlci.recordings.plausibility import Plausibility, summary
 from mlci.recordings.read import Readings
 from mlci.recordings.recording import Remark, shown_path
-from mlci.sets import SetPosterior
+from mlci.sets.posterior import SetPosterior
 from mlci.tabular import TabularModel
 from mlci.temperature import estimate_temperature
 

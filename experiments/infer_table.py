@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-import mlci.table_inference
+import mlci.worlds.inference
 from experiments.app import DONE, FAILED, run_command
 from experiments.config.paths import results_folder
 from experiments.config.problems import ConfigError
@@ -27,10 +27,10 @@ from mlci.credible_sets import most_probable
 from mlci.evidence import Rates
 from mlci.recordings.recording import Remark, shown_path
 from mlci.recordings.table_paths import read_table_paths
-from mlci.selection import select_constraints
-from mlci.set_search import Selection
-from mlci.table_inference import TableInference, is_certain
-from mlci.tables import TablePath
+from mlci.sets.search import Selection
+from mlci.sets.selection import select_constraints
+from mlci.worlds.inference import TableInference, is_certain
+from mlci.worlds.tables import TablePath
 
 _SHARE = 0.95  # of the posterior that the credible set holds
 
@@ -62,7 +62,7 @@ def infer_table(settings: TableSettings) -> int:
     begin(f"ranking {len(world.table.regions)} hypotheses")
     rates = Rates(settings.inference.model_error, settings.inference.rule_breaking)
     try:
-        inference = mlci.table_inference.infer_table(
+        inference = mlci.worlds.inference.infer_table(
             world.table,
             paths,
             steps=world.horizon,

@@ -29,9 +29,7 @@ V       values                safe set's value function                  unit of
 
 from typing import TYPE_CHECKING, Any
 
-from mlci.balls import Ball
 from mlci.calibration import Calibration, calibrate
-from mlci.causal_entropy import CausalEntropy
 from mlci.control_inference import ControlInference, infer_controls
 from mlci.control_ranges import ControlRanges
 from mlci.crossings import Crossing
@@ -39,30 +37,29 @@ from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.exploration import explore
-from mlci.first_exit import FirstExit
-from mlci.fixed_horizon import FixedHorizon
 from mlci.forecasts import ForecastMap
 from mlci.grids import Grid
-from mlci.half_spaces import HalfSpace
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.next_task import NextTask, next_tasks
-from mlci.predicates import InTaskSpace, Predicate
 from mlci.preparation import PreparedInference, infer, prepare
 from mlci.rank_errors import RankErrors, infer_until_settled, rank_errors
-from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
-from mlci.safety_filter import SafetyFilter
-from mlci.sampled import SampledDistribution, SampledModel
-from mlci.selection import select_constraints, select_regions
-from mlci.set_evidence import SetEvidence
-from mlci.set_inference import infer_sets
-from mlci.set_sampling import sample_sets
-from mlci.set_search import Selection
-from mlci.sets import SetPosterior, SetPrior, enumerate_sets
+from mlci.safety.reachability import SafeSet, solve_safe_set
+from mlci.safety.safety_filter import SafetyFilter
+from mlci.sampled.distribution import SampledDistribution, SampledModel
+from mlci.sets.evidence import SetEvidence
+from mlci.sets.inference import infer_sets
+from mlci.sets.posterior import SetPosterior, SetPrior, enumerate_sets
+from mlci.sets.sampling import sample_sets
+from mlci.sets.search import Selection
+from mlci.sets.selection import select_constraints, select_regions
+from mlci.shapes.balls import Ball
+from mlci.shapes.half_spaces import HalfSpace
+from mlci.shapes.predicates import InTaskSpace, Predicate
 from mlci.simulate import rollout
-from mlci.soft import soften
-from mlci.soft_weight import WeightEstimate, estimate_weights
+from mlci.soft.distribution import soften
+from mlci.soft.weight import WeightEstimate, estimate_weights
 from mlci.spaces import Box, StateSpace
 from mlci.system_check import check_affine, check_system
 from mlci.systems import (
@@ -72,9 +69,12 @@ from mlci.systems import (
     System,
     TelescopingPendulum,
 )
-from mlci.table_inference import TableInference, infer_table
-from mlci.tables import Table, TablePath, TableRegion
 from mlci.tabular import TabularModel, action_grid, discretize
+from mlci.worlds.causal_entropy import CausalEntropy
+from mlci.worlds.first_exit import FirstExit
+from mlci.worlds.fixed_horizon import FixedHorizon
+from mlci.worlds.inference import TableInference, infer_table
+from mlci.worlds.tables import Table, TablePath, TableRegion
 
 if TYPE_CHECKING:
     from mlci.recordings.read import read_demonstrations

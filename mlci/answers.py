@@ -13,13 +13,13 @@ from mlci.demonstrations import Demonstration
 from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
-from mlci.membership import volume_share
 from mlci.misfit import SAMPLES, Misfit, misfit
 from mlci.next_task import NextTask
 from mlci.regions import Regions
-from mlci.shapes import Cuboid
+from mlci.shapes.membership import volume_share
+from mlci.shapes.shape import Cuboid
 from mlci.size_bias import SizeBias, size_bias
-from mlci.soft_weight import WeightEstimate
+from mlci.soft.weight import WeightEstimate
 from mlci.spaces import Bools, Ints
 from mlci.support import Support, support
 from mlci.tabular import TabularModel
@@ -47,7 +47,7 @@ class Answer:
         temperature_estimate: the temperature that the demonstrations look like, if it is known.
         doubts: about the recordings themselves, such as `mlci.recordings.plausibility.summary`.
         ties: the hypotheses that the demonstrations cannot tell from the first, if that is known.
-        weights: soft or hard? What `mlci.soft_weight.estimate_weights` made of some regions.
+        weights: soft or hard? What `mlci.soft.weight.estimate_weights` made of some regions.
         next_tasks: what to record next, as `mlci.next_task.next_tasks` chose it.
     """
 
@@ -201,7 +201,7 @@ def answer(
         samples: as of `misfit`.
         temperature: what `mlci.temperature.estimate_temperature` made of the demonstrations.
         doubts: about the recordings themselves.
-        weights: what `mlci.soft_weight.estimate_weights` made of the demonstrations.
+        weights: what `mlci.soft.weight.estimate_weights` made of the demonstrations.
         next_tasks: what `mlci.next_task.next_tasks` says is to be recorded next.
     """
     distributions = (

@@ -8,8 +8,9 @@ A *stay* is a longest interval of time in which the path is in the interior of a
 is the largest share of the region's width that the path keeps to the nearest side, in the dimension
 in which it keeps least: 0 at a side, 0.5 in the middle. A side at the border of the state space,
 which no path can cross, does not count: at the border itself a path is deepest. In a region that
-is no box the depth is half the share of its deepest level (`mlci.shapes`) that the path reaches,
-looked for in 33 places a chord; a predicate of truth values is equally deep, 0.5, everywhere.
+is no box the depth is half the share of its deepest level (`mlci.shapes.shape`) that the path
+reaches, looked for in 33 places a chord; a predicate of truth values is equally deep, 0.5,
+everywhere.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.membership import deepest_level
 from mlci.regions import Regions
+from mlci.shapes.membership import deepest_level
+from mlci.shapes.spans import Spans
 from mlci.spaces import Bools, Floats, Ints
-from mlci.spans import Spans
 
 _PLACES = 33  # along a part of a chord, at which depth in a region that is no box is looked for
 _TINY = 1e-300  # a depth that keeps a quotient finite

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.control_problem import ControlFilter
+from mlci.control.control_problem import ControlFilter
+from mlci.control.ilqr import Solution, optimize
 from mlci.demonstrations import REACHED, Demonstration, Task, even_times
-from mlci.ilqr import Solution, optimize
-from mlci.reachability import SafeSet
 from mlci.regions import Regions
+from mlci.safety.reachability import SafeSet
 from mlci.simulate import EULER, Integrator, rollout, step_count
 from mlci.spaces import Bools, Box, Floats
 from mlci.systems import System

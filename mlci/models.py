@@ -14,7 +14,7 @@ import numpy as np
 from mlci.demonstrations import Task
 from mlci.evidence import decided_by_cell
 from mlci.maxent import TrajectoryDistribution
-from mlci.sampled import SampledDistribution, SampledModel
+from mlci.sampled.distribution import SampledDistribution, SampledModel
 from mlci.sampling_errors import SamplingErrors
 from mlci.spaces import Bools, Floats
 from mlci.tabular import TabularModel

@@ -13,9 +13,9 @@ from typing import Any
 import contourpy
 import numpy as np
 
-from mlci.membership import spread_points
 from mlci.planes import Plane
-from mlci.shapes import Shape
+from mlci.shapes.membership import spread_points
+from mlci.shapes.shape import Shape
 from mlci.spaces import Box, Floats
 
 _SIDE = 121  # lattice points along each side

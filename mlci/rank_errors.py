@@ -15,7 +15,7 @@ import numpy as np
 from mlci.demonstrations import Demonstration
 from mlci.inference import Inference
 from mlci.preparation import infer
-from mlci.sampled import SampledModel
+from mlci.sampled.distribution import SampledModel
 from mlci.spaces import Bools, Floats
 
 LEVEL = 0.95

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mlci.membership import volume_share
 from mlci.regions import Regions
+from mlci.shapes.membership import volume_share
 from mlci.spaces import Floats
 
 

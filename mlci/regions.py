@@ -13,12 +13,12 @@ import numpy as np
 import scipy  # loads scipy.sparse when it is first used
 from numpy.typing import ArrayLike
 
-from mlci.box_relations import boxes_inside, boxes_overlap, check_corners
-from mlci.chords import Boxes
 from mlci.grids import Grid
-from mlci.images import images
-from mlci.membership import covered_by_points, shared_by_points
-from mlci.shapes import Cuboid, Shape, as_shape, checked_hull
+from mlci.shapes.box_relations import boxes_inside, boxes_overlap, check_corners
+from mlci.shapes.chords import Boxes
+from mlci.shapes.images import images
+from mlci.shapes.membership import covered_by_points, shared_by_points
+from mlci.shapes.shape import Cuboid, Shape, as_shape, checked_hull
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 
 BoxRelation = Callable[["Regions", "Regions"], Bools]
@@ -147,7 +147,7 @@ class Regions:
         """dist_K of the union (...,) at states (..., n): below 0 inside some region.
 
         +inf everywhere if there is no region. Of a region that is no box it is the level of
-        `mlci.shapes`: of the same sign, and no more than the distance.
+        `mlci.shapes.shape`: of the same sign, and no more than the distance.
 
         Raises:
             ValueError: a region that knows no distance, such as a predicate without a steepness.

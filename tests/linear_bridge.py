@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlci.passage import Passage
+from mlci.sampled.passage import Passage
 from mlci.simulate import rollout
 from mlci.spaces import Box, Floats
 from mlci.systems import DoubleIntegrator

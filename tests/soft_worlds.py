@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 from toy_models import toy_model
 
-from mlci.soft import SoftModel
+from mlci.soft.distribution import SoftModel
 from mlci.spaces import Floats
 
 

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from mlci.tables import Table, TableRegion
+from mlci.worlds.tables import Table, TableRegion
 
 # Actions of the grid: left, right, up, down, and the four diagonal ones.
 _RIGHT, _UP = np.array([-1, 1, 0, 0, -1, 1, -1, 1]), np.array([0, 0, 1, -1, 1, 1, -1, -1])

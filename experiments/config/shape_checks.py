@@ -21,7 +21,7 @@ from experiments.config.settings import (
     SubjectSettings,
     TaskBoxSettings,
 )
-from mlci.shapes import as_shape, checked_hull
+from mlci.shapes.shape import as_shape, checked_hull
 from mlci.spaces import StateSpace
 
 

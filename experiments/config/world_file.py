@@ -14,7 +14,7 @@ from experiments.config.problems import ConfigError, checked
 from experiments.config.settings.world import WorldSettings, names_of
 from mlci.recordings.moves import Moves, read_moves
 from mlci.recordings.rows import canonical, number_of
-from mlci.tables import Table, TableRegion
+from mlci.worlds.tables import Table, TableRegion
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,9 +25,9 @@ from mlci.evidence import Rates
 from mlci.grids import Grid
 from mlci.metrics import random_subsets
 from mlci.regions import Regions
-from mlci.selection import select_regions
-from mlci.set_evidence import SetEvidence
-from mlci.sets import SetPrior
+from mlci.sets.evidence import SetEvidence
+from mlci.sets.posterior import SetPrior
+from mlci.sets.selection import select_regions
 from mlci.spaces import Bools, Floats
 
 _LEAST = 0.1  # nat a demonstration, as published

@@ -20,7 +20,7 @@ from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.inference import Inference
 from mlci.preparation import infer
-from mlci.sets import SetPosterior
+from mlci.sets.posterior import SetPosterior
 from mlci.spaces import Bools, Ints
 from mlci.tabular import TabularModel
 

@@ -16,7 +16,7 @@ from mlci.recordings.read import Readings, read_demonstrations
 from mlci.recordings.recording import Remark
 from mlci.recordings.task_table import read_task_table
 from mlci.recordings.times import refuse_long
-from mlci.soft_weight import WeightEstimate, best_forgiven, estimate_weights
+from mlci.soft.weight import WeightEstimate, best_forgiven, estimate_weights
 from mlci.tabular import TabularModel
 
 _OVERSTATED = (

@@ -14,8 +14,8 @@ from mlci.credible_sets import neighbours
 from mlci.demonstrations import Demonstration
 from mlci.evidence import Rates
 from mlci.inference import Inference
-from mlci.set_inference import infer_sets
-from mlci.sets import SetPosterior, SetPrior
+from mlci.sets.inference import infer_sets
+from mlci.sets.posterior import SetPosterior, SetPrior
 from mlci.spaces import Bools
 from mlci.tabular import TabularModel
 

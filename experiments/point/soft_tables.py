@@ -12,8 +12,8 @@ from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
 from experiments.point.streams import Purpose, stream
 from mlci.maxent import TrajectoryDistribution
-from mlci.soft import SoftModel, soften
-from mlci.soft_weight import SoftShares, tabulate_shares
+from mlci.soft.distribution import SoftModel, soften
+from mlci.soft.weight import SoftShares, tabulate_shares
 from mlci.spaces import Floats
 
 COLUMNS = ["weight", "demonstrations", "set", "estimate", "lower", "upper", "gain", "hard_to_soft"]

@@ -15,17 +15,17 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-import mlci.balls
-import mlci.constant_controls
-import mlci.half_spaces
-import mlci.reachability
+import mlci.safety.constant_controls
+import mlci.safety.reachability
+import mlci.shapes.balls
+import mlci.shapes.half_spaces
 import mlci.tabular
 from experiments.config.settings import ModelSettings, Settings, ShapeList, SubjectSettings
 from experiments.tracking.store import Store, Stored
-from mlci.constant_controls import tabulate_escapes
 from mlci.grids import Grid
-from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
+from mlci.safety.constant_controls import tabulate_escapes
+from mlci.safety.reachability import SafeSet, solve_safe_set
 from mlci.single_moves import SingleMoves
 from mlci.systems import System
 from mlci.tabular import TabularModel, discretize, moves_are_kept
@@ -51,8 +51,8 @@ def safe_set_inputs(settings: Settings) -> tuple[Any, ...]:
 
 def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
     """Omega of a truth (10) as demonstrators know it, stored or computed, and its key."""
-    grid, escapes = Grid(settings.model.space, settings.safety.shape), mlci.constant_controls
-    source = escapes if settings.safety.method == ESCAPES else mlci.reachability
+    grid, escapes = Grid(settings.model.space, settings.safety.shape), mlci.safety.constant_controls
+    source = escapes if settings.safety.method == ESCAPES else mlci.safety.reachability
 
     def compute() -> dict[str, np.ndarray]:
         system, truth = settings.real_model, settings.constraint
@@ -159,7 +159,7 @@ def shape_modules(settings: SubjectSettings, regions: Regions) -> list[ModuleTyp
     lists = _lists(settings, regions)
     own = {shape.target for listed in lists for shape in listed.shapes}
     makers = [sys.modules[target.rpartition(".")[0]] for target in sorted(own)]
-    return [mlci.balls, mlci.half_spaces, *makers]
+    return [mlci.shapes.balls, mlci.shapes.half_spaces, *makers]
 
 
 def _lists(settings: SubjectSettings, regions: Regions) -> tuple[ShapeList, ...]:

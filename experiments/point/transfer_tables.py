@@ -15,18 +15,18 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-import mlci.reachability
+import mlci.safety.reachability
 from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
 from experiments.point.stages import region_inputs, shape_modules, system_module
 from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
-from mlci.control_problem import ControlFilter, NoFilter
+from mlci.control.control_problem import ControlFilter, NoFilter
 from mlci.demonstrator import enters, first_guesses
 from mlci.grids import Grid
-from mlci.reachability import SafeSet, solve_safe_set
 from mlci.regions import Regions
-from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.safety.reachability import SafeSet, solve_safe_set
+from mlci.safety.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import EULER, step_count
 from mlci.spaces import Bools, Floats
 from mlci.strength import WithStrength
@@ -156,7 +156,7 @@ def _solved(settings: Settings, store: Store, region: Regions, strength: float) 
 
     of_region = region.names, region_inputs(settings, region)
     inputs = (settings.system, of_region, settings.safety.shape, strength)
-    modules = [mlci.reachability, system_module(settings.model), sys.modules[__name__]]
+    modules = [mlci.safety.reachability, system_module(settings.model), sys.modules[__name__]]
     modules += shape_modules(settings, region)
     stored = store.get("deployed_safe_set", inputs, modules, compute)
     return SafeSet(grid, stored["values"], stored["gradients"])

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+import mlci.control.effort
 import mlci.demonstrator
-import mlci.effort
-import mlci.safety_filter
+import mlci.safety.safety_filter
 from experiments.config.settings import Settings
 from experiments.point.no_answer import NoAnswer
 from experiments.point.stages import region_inputs, safe_set, shape_modules, system_module
@@ -23,8 +23,8 @@ from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
 from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.demonstrator import Attempt, Outcome, Trial, crossing, demonstrate, sample_trials
-from mlci.reachability import SafeSet
-from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.safety.reachability import SafeSet
+from mlci.safety.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import EULER, RK4, step_count
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 
@@ -133,8 +133,8 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
 
     modules = [
         mlci.demonstrator,
-        mlci.effort,
-        mlci.safety_filter,
+        mlci.control.effort,
+        mlci.safety.safety_filter,
         system_module(settings.model),
         sys.modules[__name__],
         *shape_modules(settings, settings.constraint),

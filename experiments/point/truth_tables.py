@@ -12,7 +12,7 @@ from experiments.point.trials import TrialSet
 from mlci.outlines import outline
 from mlci.planes import Plane, planes, simplified
 from mlci.regions import Regions
-from mlci.shapes import Shape
+from mlci.shapes.shape import Shape
 from mlci.spaces import Ints, StateSpace
 
 # Collate keeps one copy of each, opened by these columns alone.

@@ -18,7 +18,7 @@ import scipy  # loads scipy.sparse when it is first used
 from mlci.recordings.rows import Rows, canonical, number_of, read_rows
 from mlci.recordings.table import Unusable
 from mlci.spaces import Floats, Ints
-from mlci.transitions import as_transitions
+from mlci.worlds.transitions import as_transitions
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from mlci.recordings.files import find_files
 from mlci.recordings.recording import Remark, shown_path
 from mlci.recordings.rows import Rows, canonical, number_of, read_rows
 from mlci.recordings.table import Unusable
-from mlci.tables import Table, TablePath
+from mlci.worlds.tables import Table, TablePath
 
 
 class TableReadings(NamedTuple):

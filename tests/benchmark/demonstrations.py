@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from mlci.control.ilqr import optimize
 from mlci.demonstrator import sample_trials
-from mlci.ilqr import optimize
 from mlci.spaces import Box, Floats
 from mlci.systems import Pendulum
 from tests.benchmark import loops

@@ -12,9 +12,9 @@ from mlci.demonstrator import demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.preparation import infer, prepare
-from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
-from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.safety.reachability import solve_safe_set
+from mlci.safety.safety_filter import SafetyFilter, border_margin
 from mlci.spaces import Box
 from mlci.systems import Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize

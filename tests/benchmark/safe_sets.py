@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from mlci.grids import Grid
-from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
+from mlci.safety.reachability import solve_safe_set
 from mlci.spaces import Bools, Box, Floats
 from mlci.systems import Pendulum, System, TelescopingPendulum
 from tests.benchmark import loops

@@ -17,10 +17,10 @@ from experiments import infer as command
 from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
-from mlci.reachability import solve_safe_set
 from mlci.recordings.write import write_demonstration
 from mlci.regions import Regions
-from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.safety.reachability import solve_safe_set
+from mlci.safety.safety_filter import SafetyFilter, border_margin
 from mlci.spaces import Box
 from mlci.systems import Pendulum
 

@@ -15,7 +15,7 @@ from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.preparation import infer
 from mlci.regions import Regions
-from mlci.soft_weight import WeightEstimate
+from mlci.soft.weight import WeightEstimate
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator
 from mlci.tabular import action_grid, discretize

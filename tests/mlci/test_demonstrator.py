@@ -3,6 +3,7 @@ import time
 import numpy as np
 import pytest
 
+from mlci.control.ilqr import Solution, optimize
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import (
     Outcome,
@@ -14,10 +15,9 @@ from mlci.demonstrator import (
     sample_trials,
 )
 from mlci.grids import Grid
-from mlci.ilqr import Solution, optimize
-from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
-from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.safety.reachability import solve_safe_set
+from mlci.safety.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import RK4, euler_step, rollout
 from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator, Pendulum

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from mlci.control.effort import WithEffort
 from mlci.diagnosis import Diagnosis, diagnose
-from mlci.effort import WithEffort
 from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.spaces import Box

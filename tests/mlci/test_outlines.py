@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlci.balls import Ball
-from mlci.half_spaces import HalfSpace
 from mlci.outlines import outline
 from mlci.planes import Plane
-from mlci.shapes import Shape
+from mlci.shapes.balls import Ball
+from mlci.shapes.half_spaces import HalfSpace
+from mlci.shapes.shape import Shape
 from mlci.spaces import Box, StateSpace
 
 PLANE = StateSpace(Box([-2, -2], [2, 2]), [False, False], ("x", "y"))

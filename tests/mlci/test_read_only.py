@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from mlci.constant_controls import escape_value
+from mlci.control.ilqr import optimize
 from mlci.demonstrations import Demonstration, Task
-from mlci.fixed_horizon import FixedHorizon
 from mlci.grids import Grid
-from mlci.ilqr import optimize
 from mlci.preparation import infer
-from mlci.reachability import SafeSet
 from mlci.regions import Regions
+from mlci.safety.constant_controls import escape_value
+from mlci.safety.reachability import SafeSet
 from mlci.single_moves import SingleMoves
 from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator
-from mlci.tables import Table
 from mlci.tabular import discretize
+from mlci.worlds.fixed_horizon import FixedHorizon
+from mlci.worlds.tables import Table
 
 Fixed = Callable[[Any], Any]  # gives an array with these values, which can or cannot be written to
 SYSTEM = DoubleIntegrator()

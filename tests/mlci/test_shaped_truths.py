@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlci.balls import Ball
-from mlci.closest_approach import KeepOut
-from mlci.constant_controls import escape_value, tabulate_escapes
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.grids import Grid
-from mlci.half_spaces import HalfSpace
-from mlci.predicates import Predicate
-from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
-from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.safety.closest_approach import KeepOut
+from mlci.safety.constant_controls import escape_value, tabulate_escapes
+from mlci.safety.reachability import solve_safe_set
+from mlci.safety.safety_filter import SafetyFilter, border_margin
+from mlci.shapes.balls import Ball
+from mlci.shapes.half_spaces import HalfSpace
+from mlci.shapes.predicates import Predicate
 from mlci.simulate import rk4_step
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator, FunctionSystem, Pendulum

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mlci.balls import Ball
 from mlci.evidence import Rates
 from mlci.inference import Inference
 from mlci.region_sizes import region_sizes, weights_by_size
 from mlci.regions import Regions
+from mlci.shapes.balls import Ball
 from mlci.size_bias import size_bias
 from mlci.spaces import Box, StateSpace
 

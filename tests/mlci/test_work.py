@@ -13,9 +13,9 @@ from held_bytes import held_bytes
 
 from mlci import recursions
 from mlci.compiled import Compiled
+from mlci.control.ilqr import optimize
 from mlci.demonstrations import Task
 from mlci.grids import Grid
-from mlci.ilqr import optimize
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
 from mlci.spaces import Box, Floats

@@ -40,7 +40,7 @@ from experiments.config.settings.parts import (
 from experiments.config.settings.reality import RealitySettings, read_reality
 from experiments.config.settings.shapes import ShapeList
 from experiments.config.settings.system import SystemSettings, read_system
-from mlci.effort import WithEffort
+from mlci.control.effort import WithEffort
 from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.spaces import Box, Floats

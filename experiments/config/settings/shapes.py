@@ -17,9 +17,9 @@ from experiments.config.settings.targets import (
     target_error,
     target_of,
 )
-from mlci.balls import Ball
-from mlci.half_spaces import HalfSpace
-from mlci.shapes import Shape
+from mlci.shapes.balls import Ball
+from mlci.shapes.half_spaces import HalfSpace
+from mlci.shapes.shape import Shape
 from mlci.spaces import Box
 
 
@@ -77,7 +77,7 @@ class HalfSpaceSettings:
 class ShapeSettings:
     """A shape of one's own: what a function or class makes of its arguments."""
 
-    target: Annotated[Word, about("dotted name of what returns a mlci.shapes.Shape")]
+    target: Annotated[Word, about("dotted name of what returns a mlci.shapes.shape.Shape")]
     arguments: Annotated[Mapping[str, Any], about("what it takes")]
 
     def shape(self) -> Shape:

@@ -262,13 +262,16 @@ VALUES = [
     ("truth.shapes=[{_target_:math.pi}]", "truth.shapes[0]._target_: 'math.pi' is no function"),
     ("truth.shapes=[{_target_:math.tau}]", "'math.tau' is no function"),
     ("truth.shapes=[{_target_:fractions.Fraction}]", "fractions.Fraction must return a region"),
-    ("truth.shapes=[{_target_:mlci.balls.Ball}]", "truth.shapes[0].center: missing; give it"),
     (
-        "truth.shapes=[{_target_:mlci.balls.Ball,center:[0],radii:[0]}]",
-        "truth.shapes[0]: mlci.balls.Ball fails: ValueError: a ball needs positive radii",
+        "truth.shapes=[{_target_:mlci.shapes.balls.Ball}]",
+        "truth.shapes[0].center: missing; give it",
     ),
     (
-        "truth.shapes=[{_target_:mlci.balls.Ball,center:[0],radii:1}]",
+        "truth.shapes=[{_target_:mlci.shapes.balls.Ball,center:[0],radii:[0]}]",
+        "truth.shapes[0]: mlci.shapes.balls.Ball fails: ValueError: a ball needs positive radii",
+    ),
+    (
+        "truth.shapes=[{_target_:mlci.shapes.balls.Ball,center:[0],radii:1}]",
         "truth.shapes[0]: a ball needs a centre of 2 dimensions",
     ),
     ("truth.name=3", "truth.name: 3 is not a word"),

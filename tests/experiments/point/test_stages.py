@@ -17,9 +17,9 @@ from experiments.point import stages, trials
 from experiments.point.run import run_point
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.store import Store
-from mlci.constant_controls import tabulate_escapes
 from mlci.grids import Grid
-from mlci.safety_filter import SafetyFilter, border_margin
+from mlci.safety.constant_controls import tabulate_escapes
+from mlci.safety.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import EULER, RK4, rollout
 from mlci.systems import Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from mlci.recordings.moves import read_moves
 from mlci.recordings.table_paths import read_table_paths
-from mlci.tables import Table
+from mlci.worlds.tables import Table
 
 # A corridor from hall to yard, with a door that may stay shut.
 MOVES = """# the house

@@ -1,0 +1,1 @@
+"""Optimal control of many tasks at once: iLQR."""

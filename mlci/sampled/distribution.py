@@ -1,0 +1,287 @@
+"""The maximum entropy distribution of a task without cells, by importance sampling.
+
+`Passage` states the distribution. Its modes are found by the demonstrator's optimiser (`modes`),
+Gaussian policies round them (`local_policies`) propose whole paths, and each path has the weight
+that corrects for its proposal (`proposals`). The probability of avoiding a region, of any shape and
+number, is the weighted share of the paths that do, with a standard error.
+
+No cells: trajectories begin at the start and end in the goal region, a point's with a tolerance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy  # loads scipy.special when it is first used
+
+from mlci.demonstrations import REACHED, Task
+from mlci.regions import Regions
+from mlci.sampled.adaptation import adapted_proposal
+from mlci.sampled.modes import Modes, find_modes
+from mlci.sampled.passage import Passage
+from mlci.sampled.proposals import draw
+from mlci.sampled.weights import deviations, effective_count, pareto_shape
+from mlci.simulate import step_count
+from mlci.spaces import Bools, Box, Floats, Ints
+from mlci.systems import System
+
+ROUNDED_TIMES = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
+_SEARCH, _DRAWS, _REPLICATES = range(3)  # a generator each, so that none depends on another
+_PAIRS_AT_ONCE = 4_000_000  # of paths and regions
+_EFFECTIVE, _PARETO, _LATE = 100.0, 0.7, 0.02  # what a result needs to be believed
+
+
+@dataclass(frozen=True, eq=False)
+class SampledModel:
+    """What distributions of tasks are made of: it takes the place of a `TabularModel`.
+
+    Attributes:
+        system: dynamics, running reward, state space.
+        regions: the C regions.
+        dt: for which a control is held [s].
+        temperature: divides the reward.
+        samples: paths of a task.
+        seed: a task's samples depend on it and on the task only.
+        substeps: Runge-Kutta steps a hold, whose chords are tested for crossings.
+        restarts: first guesses of the optimiser for each winding.
+        tolerance: half width of the goal in the dimensions in which it is a point.
+        limit: range of the controls, such as the system's control box; None for none.
+        replicates: of probabilities, from which errors of a ranking are told.
+
+    Raises:
+        ValueError: a number that is not positive.
+    """
+
+    system: System
+    regions: Regions
+    dt: float
+    temperature: float = 1.0
+    samples: int = 4000
+    seed: int = 0
+    substeps: int = 4
+    restarts: int = 6
+    tolerance: float = REACHED
+    limit: Box | None = None
+    replicates: int = 200
+
+    def __post_init__(self) -> None:
+        for name in ("dt", "temperature", "samples", "substeps", "restarts", "tolerance"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"SampledModel.{name} must be positive: {getattr(self, name)}")
+
+    def passage(self, task: Task, *, round_horizon: bool = False) -> Passage:
+        """The random motion of a task.
+
+        Args:
+            task: the task.
+            round_horizon: take the nearest number of holds where dt does not divide the horizon.
+
+        Raises:
+            ValueError: a start outside the state space, or a horizon that dt does not divide.
+        """
+        steps = max(1, round(task.horizon / self.dt))
+        if not round_horizon:
+            steps = step_count(task.horizon, self.dt, ROUNDED_TIMES)
+        point = task.goal.widths == 0
+        goal = Box(
+            np.where(point, task.goal.lower - self.tolerance, task.goal.lower),
+            np.where(point, task.goal.upper + self.tolerance, task.goal.upper),
+        )
+        return Passage(
+            *(self.system, task.start, goal, steps, self.dt),
+            *(self.temperature, self.substeps, self.limit),
+        )
+
+    def distribution(self, task: Task, *, round_horizon: bool = False) -> SampledDistribution:
+        """The distribution of a task; arguments as of `passage`."""
+        passage = self.passage(task, round_horizon=round_horizon)
+        ends = np.concatenate([task.start, passage.goal.lower, passage.goal.upper])
+        words = np.append(ends, task.horizon).view(np.uint32).tolist()
+        key = self.seed, *words
+        modes = find_modes(passage, self.restarts, np.random.default_rng([*key, _SEARCH]))
+        return sample_passage(passage, self.regions, modes, self.samples, key)
+
+
+@dataclass(frozen=True, eq=False)
+class SamplingDiagnosis:
+    """Whether samples can be believed.
+
+    Attributes:
+        samples: paths that were drawn.
+        reached: share of them that end in the goal and stay in the state space.
+        effective: paths of equal weight that would tell as much.
+        pareto_k: shape of the weights' tail, see `mlci.sampled.weights.pareto_shape`.
+        mode_probability: (M,) probability of the paths that are due to each mode.
+        late: probability of the modes that only the second half of the restarts led to; above 0 it
+            tells that more restarts may lead to more.
+        rounds: of refits.
+    """
+
+    samples: int
+    reached: float
+    effective: float
+    pareto_k: float
+    mode_probability: Floats
+    late: float
+    rounds: int
+
+    @property
+    def complaints(self) -> list[str]:
+        """Why the samples are not to be believed, a phrase each; empty if they are."""
+        found = []
+        if not self.effective >= _EFFECTIVE:
+            found.append(
+                f"{self.effective:.0f} effective samples, fewer than {_EFFECTIVE:.0f}: take more"
+            )
+        if not self.pareto_k <= _PARETO:
+            found.append(f"the weights' tail has k = {self.pareto_k:.2f}, above {_PARETO}")
+        if self.late > _LATE:
+            found.append(
+                f"the last restarts still add {self.late:.2f} of the probability: take more"
+            )
+        return found
+
+    @property
+    def trusted(self) -> bool:
+        """Whether there is nothing to complain of."""
+        return not self.complaints
+
+
+@dataclass(frozen=True, eq=False)
+class SampledDistribution:
+    """Weighted paths of a task; made by `SampledModel.distribution`.
+
+    Attributes:
+        passage: what they are paths of.
+        regions: the C regions.
+        modes: the modes that were found.
+        paths: (B, K+1, n) states of the paths that count, not wrapped.
+        weight: (B,) weight of each; they add up to 1 if there is any.
+        reached: (N,) which of all the paths that were drawn are these: the others have no weight.
+        strata: (N,) component of the proposal that each of all comes from.
+        log_z: log of the integral Z [nat]; -inf where no path reaches the goal.
+        log_z_error: its standard error.
+        diagnosis: whether to believe it.
+        key: what its generators are seeded with.
+    """
+
+    passage: Passage
+    regions: Regions
+    modes: Modes
+    paths: Floats
+    weight: Floats
+    reached: Bools
+    strata: Ints
+    log_z: float
+    log_z_error: float
+    diagnosis: SamplingDiagnosis
+    key: tuple[int, ...]
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether any path reaches the goal: else there is no distribution."""
+        return len(self.weight) > 0
+
+    @cached_property
+    def avoided(self) -> Bools:
+        """(B, C) which regions each path avoids."""
+        blocks = max(1, self.weight.size * len(self.regions) // _PAIRS_AT_ONCE)
+        parts = np.array_split(self.paths, blocks)
+        return ~np.concatenate([self.regions.violated_by(part) for part in parts])
+
+    def avoidance_probabilities(self) -> Floats:
+        """alpha_i (C,): the probability that a path does not cross region i.
+
+        Raises:
+            ValueError: no path reaches the goal.
+        """
+        self._require_possible()
+        return np.clip(self.weight @ self.avoided, 0.0, 1.0)
+
+    def violation_probabilities(self) -> Floats:
+        """Phi_i = 1 - alpha_i (C,)."""
+        return 1.0 - self.avoidance_probabilities()
+
+    def influences(self) -> Floats:
+        """(N, C) how much each path moves alpha: the variance of alpha is the sum of squares.
+
+        Raises:
+            ValueError: no path reaches the goal.
+        """
+        alpha = self.avoidance_probabilities()
+        moved = np.zeros((len(self.strata), len(alpha)))
+        moved[self.reached] = self.weight[:, None] * (self.avoided - alpha)
+        return deviations(moved, self.strata)
+
+    def avoidance_errors(self) -> Floats:
+        """(C,) standard errors of alpha.
+
+        No less than one effective sample's share: what no sample shows may be so rare.
+        """
+        squares = np.sum(np.square(self.influences()), axis=0)
+        return np.sqrt(squares + 1 / self.diagnosis.effective**2)
+
+    def avoidance_replicates(self, count: int) -> Floats:
+        """(count, C) alpha as other samples of the same number might give it.
+
+        Regions that a path avoids together err together. The same task gives the same replicates.
+        """
+        influences = self.influences()
+        rng = np.random.default_rng([*self.key, _REPLICATES])
+        alpha = self.avoidance_probabilities()
+        moved = alpha + rng.standard_normal((count, len(influences))) @ influences
+        return np.clip(moved, 0.0, 1.0)
+
+    def sample(self, count: int, rng: np.random.Generator) -> Floats:
+        """Paths (count, K+1, n), drawn anew from the weighted ones.
+
+        Raises:
+            ValueError: no path reaches the goal.
+        """
+        self._require_possible()
+        return np.asarray(self.paths[rng.choice(len(self.weight), size=count, p=self.weight)])
+
+    def _require_possible(self) -> None:
+        """Raise where there is no distribution."""
+        if not self.is_possible:
+            raise ValueError("no sampled path reaches the goal: probabilities are not defined")
+
+
+def sample_passage(
+    passage: Passage,
+    regions: Regions,
+    modes: Modes,
+    samples: int,
+    key: tuple[int, ...],
+) -> SampledDistribution:
+    """Weighted paths of a passage, from policies round its modes; the key seeds the draws."""
+    rng = np.random.default_rng([*key, _DRAWS])
+    if not len(modes):
+        nothing, paths = np.zeros(0), np.zeros((0, 2, len(passage.start)))
+        none = nothing, nothing.astype(bool), nothing.astype(np.int64)
+        diagnosis = SamplingDiagnosis(0, 0.0, 0.0, np.inf, nothing, 0.0, 0)
+        of_nothing = paths, *none, -np.inf, np.inf, diagnosis, key
+        return SampledDistribution(passage, regions, modes, *of_nothing)
+    proposal, rounds = adapted_proposal(passage, modes, samples, max(1000, samples // 3), rng)
+    draws = draw(passage, proposal, rng)
+    log_weight = np.where(draws.reached, draws.log_weight, -np.inf)
+    count, reached = len(log_weight), draws.reached
+    log_total = float(scipy.special.logsumexp(log_weight))
+    weight = np.exp(log_weight - log_total) if reached.any() else np.zeros(count)
+    probability = weight @ draws.mode_share
+    diagnosis = SamplingDiagnosis(
+        samples=count,
+        reached=float(np.mean(reached)),
+        effective=effective_count(log_weight),
+        pareto_k=pareto_shape(log_weight),
+        mode_probability=probability,
+        late=float(probability @ modes.late),
+        rounds=rounds,
+    )
+    error = float(np.sqrt(np.sum(np.square(deviations(weight, draws.component)))))
+    return SampledDistribution(
+        *(passage, regions, modes, draws.paths[reached], weight[reached], reached),
+        *(draws.component, log_total - np.log(count), error, diagnosis, key),
+    )

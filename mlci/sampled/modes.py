@@ -1,0 +1,180 @@
+"""The locally optimal ways of a passage: where the density of its paths has its modes.
+
+The optimiser of the demonstrator starts from many first guesses towards each winding of the goal,
+winding by winding in both directions for as long as these still bring ways that are not too dear.
+The goal is a Gaussian here, see `Passage.goal_price`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlci.control.ilqr import Solution, optimize
+from mlci.demonstrator import first_guesses
+from mlci.sampled.passage import Passage
+from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
+from mlci.systems import System
+
+GOAL_SHARE = 0.7  # of a goal's half width: the Gaussian that loses fewest samples on a box
+_HOLD = 0.5  # s for which a first guess holds a control
+_CUT = 12.0  # nat: ways so much less likely than the best do not count
+_SAME = 0.3  # squared distance of controls, in their free standard deviations, of equal ways
+_ITERATIONS = 60
+_TOLERANCE = 1e-6  # of a cost; the policy round a way corrects for what is left
+_TURNS = 6  # windings on each side are looked at no further
+
+
+@dataclass(frozen=True, eq=False)
+class Unrolled(System):
+    """A system whose space does not wrap: states that are whole turns apart are different."""
+
+    system: System
+
+    @property
+    def space(self) -> StateSpace:
+        space = self.system.space
+        return StateSpace(space.bounds, np.zeros_like(space.periodic), space.names, space.units)
+
+    @property
+    def control_box(self) -> Box:
+        return self.system.control_box
+
+    def dynamics(self, states: Floats, controls: Floats) -> Floats:
+        return self.system.dynamics(states, controls)
+
+    def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
+        return self.system.jacobians(states, controls)
+
+    def running_reward(self, states: Floats, controls: Floats) -> Floats:
+        return self.system.running_reward(states, controls)
+
+    def reward_derivatives(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
+        return self.system.reward_derivatives(states, controls)
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The M ways that were found, the cheapest first; there may be none.
+
+    Attributes:
+        states: (M, T+1, n) path, not wrapped.
+        controls: (M, T, m) controls.
+        goals: (M, n) middle of the goal, by the winding that the way takes.
+        cost: (M,) minus log density, but for a constant [nat].
+        restarts: (M,) first guesses that led to it.
+        late: (M,) whether only the second half of the guesses did.
+    """
+
+    states: Floats
+    controls: Floats
+    goals: Floats
+    cost: Floats
+    restarts: Ints
+    late: Bools
+
+    def __len__(self) -> int:
+        return len(self.cost)
+
+
+def find_modes(passage: Passage, restarts: int, rng: np.random.Generator) -> Modes:
+    """The locally optimal ways of a passage.
+
+    Args:
+        passage: start, goal, dynamics and reward.
+        restarts: first guesses for each winding; the first of them is a control that is at rest in
+            the middle of its range.
+        rng: draws the others.
+    """
+    rings, best = [], np.inf
+    for turns in _rings(passage):
+        solution, goals = _solve(passage, turns, restarts, rng)
+        cost = solution.cost / passage.temperature
+        rings.append((solution.states, solution.controls, goals, cost))
+        ring, best = float(np.min(cost)), min(best, float(np.min(cost)))
+        if ring > best + _CUT:
+            break
+    states, controls, goals, cost = (
+        np.concatenate([ring[part] for ring in rings]) for part in range(4)
+    )
+    return _distinct(passage, restarts, states, controls, goals, cost)
+
+
+def _rings(passage: Passage) -> Iterator[Floats]:
+    """Windings (L, n): those up to a turn from the goal that is nearest, two turns, three ..."""
+    round_ = np.flatnonzero(passage.system.space.periodic & np.isfinite(passage.half))
+    for ring in range(1, _TURNS + 1 if len(round_) else 2):
+        least = 0 if ring == 1 else ring
+        ways = [
+            way
+            for way in itertools.product(range(-ring, ring + 1), repeat=len(round_))
+            if least <= sum(map(abs, way)) <= ring
+        ]
+        turns = np.zeros((len(ways), passage.system.space.dimension))
+        turns[:, round_] = ways
+        yield turns
+
+
+def _solve(
+    passage: Passage, turns: Floats, restarts: int, rng: np.random.Generator
+) -> tuple[Solution, Floats]:
+    """What the optimiser makes of first guesses towards some windings (L, n), and goals (B, n)."""
+    system = passage.system
+    goals = passage.nearest_goal + turns * system.space.bounds.widths
+    goals = np.repeat(goals, restarts, axis=0)
+    per_hold = max(1, round(_HOLD / passage.dt))
+    guesses = first_guesses(rng, system.control_box, passage.steps, per_hold, len(goals))
+    guesses[::restarts] = (system.control_box.lower + system.control_box.upper) / 2
+    free = np.isinf(passage.half)
+    solution = optimize(
+        Unrolled(system),
+        np.tile(passage.start, (len(goals), 1)),
+        np.where(free, -np.inf, goals),
+        np.where(free, np.inf, goals),
+        guesses,
+        passage.dt,
+        goal_weight=1.0,
+        goal_scale=np.sqrt(passage.goal_price(GOAL_SHARE)),
+        iterations=_ITERATIONS,
+        tolerance=_TOLERANCE,
+        limit=passage.limit,
+        integrator=passage.integrator,
+    )
+    return solution, goals
+
+
+def _distinct(
+    passage: Passage, restarts: int, states: Floats, controls: Floats, goals: Floats, cost: Floats
+) -> Modes:
+    """The ways (B, ...) that are not too dear, equal ones merged into the cheapest of them.
+
+    Of the guesses for each winding there are some restarts, one after the other.
+    """
+    deviation = passage.temperature / (2 * passage.dt)
+    numbers: list[int] = []
+    counts: list[int] = []
+    late: list[bool] = []
+    for way in np.argsort(cost, kind="stable").tolist():
+        if not cost[way] <= np.min(cost) + _CUT or cost[way] == np.inf:
+            break
+        is_late = way % restarts >= restarts / 2
+        apart = controls[numbers] - controls[way]
+        near = np.flatnonzero(np.sum(np.square(apart), axis=(1, 2)) < _SAME * deviation)
+        if len(near):
+            counts[near[0]] += 1
+            late[near[0]] &= is_late
+        else:
+            numbers.append(way)
+            counts.append(1)
+            late.append(is_late)
+    return Modes(
+        states=states[numbers],
+        controls=controls[numbers],
+        goals=goals[numbers],
+        cost=cost[numbers],
+        restarts=np.array(counts, dtype=np.int64),
+        late=np.array(late, dtype=bool),
+    )

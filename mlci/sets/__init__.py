@@ -1,0 +1,1 @@
+"""Several constraints: belief over sets of hypotheses, and selection of one set."""

@@ -1,0 +1,171 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear_bridge import WIDE, random_bridge
+
+from mlci.demonstrations import Task
+from mlci.grids import Grid
+from mlci.maxent import TrajectoryDistribution
+from mlci.regions import Regions
+from mlci.sampled.distribution import SampledModel, SamplingDiagnosis
+from mlci.spaces import Box, Floats
+from mlci.systems import Pendulum
+from mlci.tabular import action_grid, discretize
+
+PENDULUM = Pendulum()
+CELLS = Regions.from_grid(PENDULUM.space, (10, 10))
+MODEL = SampledModel(PENDULUM, CELLS, 0.25, samples=800, restarts=3)
+TASK = Task(np.array([0.5, 0.0]), Box([2.9, -0.2], [3.1, 0.2]), 5.0)
+
+
+def linear_scores(tasks: int, seed: int, exact_samples: int) -> tuple[Floats, Floats, Floats]:
+    """Errors of log Z (N,) and alpha (N, 10), in standard errors, and alpha."""
+    rng, log_z, scores, alphas = np.random.default_rng(seed), [], [], []
+    for number in range(tasks):
+        bridge = random_bridge(rng)
+        passage = bridge.passage
+        lower = rng.uniform(-3, 2, (10, 2))
+        regions = Regions(WIDE.space, lower, lower + rng.uniform(0.2, 2, (10, 2)))
+        model = SampledModel(
+            WIDE, regions, passage.dt, passage.temperature, samples=1500, seed=number
+        )
+        horizon = passage.steps * passage.dt
+        sampled = model.distribution(Task(passage.start, passage.goal, horizon))
+        log_z.append((sampled.log_z - bridge.log_z) / sampled.log_z_error)
+        paths = bridge.paths(exact_samples, rng)
+        alpha = np.mean(~regions.violated_by(paths), axis=0)
+        error = np.sqrt(alpha * (1 - alpha) / len(paths) + 1 / len(paths) ** 2)
+        error = np.hypot(error, sampled.avoidance_errors())
+        scores.append((sampled.avoidance_probabilities() - alpha) / error)
+        alphas.append(alpha)
+    return np.array(log_z), np.array(scores), np.array(alphas)
+
+
+def test_linear_passages_have_the_closed_forms_log_z_and_the_bridges_probabilities():
+    log_z, scores, _ = linear_scores(tasks=6, seed=0, exact_samples=4000)
+    assert np.all(np.abs(log_z) < 3.2)  # by chance, one such test in a hundred fails
+    assert np.mean(np.abs(scores) < 3) >= 0.99
+
+
+@pytest.mark.long
+def test_errors_of_many_linear_passages_are_as_large_as_said():
+    log_z, scores, alpha = linear_scores(tasks=30, seed=1, exact_samples=20_000)
+    between = (alpha > 0.02) & (alpha < 0.98)
+    assert np.mean(np.abs(log_z) < 3) >= 0.99
+    assert np.mean(np.abs(scores) < 3) >= 0.99
+    assert 0.90 <= np.mean(np.abs(log_z) < 1.96) <= 1.0
+    assert 0.90 <= np.mean(np.abs(scores[between]) < 1.96) <= 0.98
+    assert 0.85 < np.std(scores[between]) < 1.15
+
+
+def pendulum_gaps(
+    cells: int, tasks: int, samples: int, torque: float = 6.0
+) -> tuple[Floats, Floats, Floats]:
+    """Sampled less tabular: Phi (N, 100) and log Z (N,), and the standard errors of Phi."""
+    rng, gaps, apart = np.random.default_rng(7), [], 2 * torque / 24
+    grid = Grid(PENDULUM.space, (cells, cells))
+    actions = action_grid(PENDULUM, 25, Box([-torque], [torque]))
+    coarse = Grid(PENDULUM.space, (60, 60))
+    wide = Box([-torque - apart / 2], [torque + apart / 2])  # what the actions stand for
+    tabular = discretize(PENDULUM, grid, actions, 0.25, CELLS)
+    model = SampledModel(PENDULUM, CELLS, 0.25, samples=samples, limit=wide)
+    for _ in range(tasks):
+        start, goal = rng.uniform([0.0, -2.0], [2 * np.pi, 2.0], (2, 2))
+        lower, upper = (corners[coarse.index(goal)] for corners in coarse.corners)
+        task = Task(start, Box(lower + 1e-9, upper - 1e-9), 5.0)
+        exact = TrajectoryDistribution.of_task(tabular, task, exact_ends=True)
+        sampled = model.distribution(task)
+        assert sampled.diagnosis.trusted
+        phi = sampled.violation_probabilities() - exact.violation_probabilities()
+        log_z = sampled.log_z - (exact.log_z[0, exact.start] + 20 * np.log(apart))
+        gaps.append((phi, log_z, sampled.avoidance_errors()))
+    phi, log_z, errors = (np.array(part) for part in zip(*gaps, strict=True))
+    return phi, log_z, errors
+
+
+@pytest.mark.parametrize("torque", [6.0, 2.0])
+def test_a_pendulum_is_as_on_a_grid(torque):
+    # 60 x 60 cells are off by 0.004 in the mean and 0.1 at most, as finer ones tell.
+    phi, log_z, _ = pendulum_gaps(cells=60, tasks=1, samples=2000, torque=torque)
+    assert np.mean(np.abs(phi)) < 0.01
+    assert np.max(np.abs(phi)) < 0.15
+    assert np.max(np.abs(log_z)) < 0.3
+
+
+@pytest.mark.long
+def test_a_pendulum_comes_nearer_to_the_grid_the_finer_it_is():
+    coarse, fine = (pendulum_gaps(cells, tasks=4, samples=6000)[0] for cells in (60, 120))
+    assert np.mean(np.abs(fine)) < 0.005
+    assert np.max(np.abs(fine)) < 0.05
+    assert np.mean(np.abs(fine)) < np.mean(np.abs(coarse))
+
+
+def test_the_same_task_gives_the_same_samples_and_another_seed_others():
+    first, again = (MODEL.distribution(TASK) for _ in range(2))
+    other = replace(MODEL, seed=1).distribution(TASK)
+    np.testing.assert_array_equal(first.paths, again.paths)
+    np.testing.assert_array_equal(first.avoidance_replicates(3), again.avoidance_replicates(3))
+    assert other.log_z != first.log_z
+    assert abs(other.log_z - first.log_z) < 4 * np.hypot(other.log_z_error, first.log_z_error)
+
+
+def test_replicates_and_samples_are_of_the_same_distribution():
+    distribution = MODEL.distribution(TASK)
+    alpha, errors = distribution.avoidance_probabilities(), distribution.avoidance_errors()
+    replicates = distribution.avoidance_replicates(2000)
+    between = (alpha > 0.1) & (alpha < 0.9)
+    np.testing.assert_allclose(np.std(replicates, axis=0)[between], errors[between], rtol=0.1)
+    # Every path crosses one of two halves of the angles, so that these err in opposite directions.
+    paths = distribution.sample(4000, np.random.default_rng(0))
+    again = np.mean(~CELLS.violated_by(paths), axis=0)
+    assert np.max(np.abs(again - alpha)) < 0.04
+    assert np.all(PENDULUM.space.contains(paths))
+    assert np.all(distribution.passage.excess(paths[:, -1]) <= 1)
+
+
+@pytest.mark.long
+def test_phi_converges_as_the_hold_gets_shorter():
+    holds = [1.0, 0.5, 0.25, 0.125]
+    *coarse, finest = (
+        replace(MODEL, dt=dt, samples=4000, restarts=6, substeps=round(dt / 0.03125)).distribution(
+            Task(np.array([4.0, 1.0]), Box([1.0, -0.2], [1.2, 0.2]), 5.0)
+        )
+        for dt in [*holds, 0.03125]
+    )
+    phi, error = finest.violation_probabilities(), finest.avoidance_errors()
+    gaps = []
+    for each in coarse:
+        apart = np.square(each.violation_probabilities() - phi)
+        noise = np.square(each.avoidance_errors()) + np.square(error)
+        gaps.append(np.sqrt(np.mean(apart - noise)))
+    slope = np.polyfit(np.log(holds), np.log(gaps), 1)[0]
+    assert 0.4 < slope < 1.2
+    assert np.all(np.diff(gaps) < 0)
+    assert gaps[-1] < 0.03
+
+
+def test_a_goal_out_of_reach_is_impossible():
+    model = replace(MODEL, limit=Box([-0.01], [0.01]))
+    distribution = model.distribution(Task(np.array([0.0, 0.0]), Box.point([3.0, 0.0]), 0.5))
+    assert not distribution.is_possible
+    assert distribution.log_z == -np.inf
+    assert not distribution.diagnosis.trusted
+    with pytest.raises(ValueError, match="no sampled path reaches the goal"):
+        distribution.avoidance_probabilities()
+
+
+def test_a_diagnosis_says_what_is_wrong():
+    well = SamplingDiagnosis(4000, 0.7, 1500.0, 0.2, np.ones(1), 0.0, 2)
+    assert well.trusted
+    thin = replace(well, effective=12.0, pareto_k=0.93, late=0.1)
+    assert [phrase.split()[0] for phrase in thin.complaints] == ["12", "the", "the"]
+    assert not thin.trusted
+
+
+def test_a_model_and_tasks_that_cannot_be_are_refused():
+    with pytest.raises(ValueError, match=r"SampledModel\.samples must be positive: 0"):
+        replace(MODEL, samples=0)
+    with pytest.raises(ValueError, match="does not divide the horizon"):
+        MODEL.distribution(replace(TASK, horizon=5.1))
+    assert MODEL.passage(replace(TASK, horizon=5.1), round_horizon=True).steps == 20
