@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.rows import Unsuited
-from paper_figures.style import GUIDE, PAGE, RC, new_figure
+from paper_figures.style import DEMONSTRATION, GUIDE, PAGE, RC, TRUTH, new_figure
 
 SAVED = (
     "truth source until repetitions longest chosen_median chosen_median_low chosen_median_high "
@@ -26,7 +26,7 @@ WORDS = {
     "model": "drawn from the model:\nfirst, posterior > 0.95",
     "demonstrator": "simulated demonstrator:\nfirst, and stays so",
 }
-_LOOKS = {"chosen": ("#0072b2", "-"), "random": ("#d55e00", "--")}
+_LOOKS = {"chosen": (DEMONSTRATION, "-"), "random": (TRUTH, "--")}
 
 
 def counted_rows(table: pd.DataFrame) -> pd.DataFrame:

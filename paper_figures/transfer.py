@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -35,7 +37,8 @@ TABLES = {
         "trials",
         "entered",
     ),
-    "transfer_values": ("strength", "state_1", "state_2", "value"),
+    "transfer_values": ("region", "strength", "state_1", "state_2", "value"),
+    "cases": ("case", "choice", "value"),
     "regions": ("region",),
     "dimensions": ("name", "unit", "lower", "upper", "periodic"),
 }
@@ -52,6 +55,25 @@ _LOOKS = {
     "no filter": (STEP_COLOURS[3], OTHER_MARKS[1]),
     "never entered": (STEP_COLOURS[1], OTHER_MARKS[0]),
 }
+
+
+def with_cases(transfer: pd.DataFrame, cases: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """The rows of each case, in the order of the cases.
+
+    Raises:
+        Unsuited: a row is of no case.
+    """
+    keys = [name for name in cases if name not in ("case", "choice", "value")]
+    rows = transfer.merge(cases[[*keys, "case"]], on=keys, how="left", validate="many_to_one")
+    if rows["case"].isna().any():
+        raise Unsuited("some points are of no case")
+    return {str(case): rows[rows["case"] == case] for case in cases["case"].drop_duplicates()}
+
+
+def right_points(transfer: pd.DataFrame) -> tuple[int, int]:
+    """In how many points the inferred region is the truth, and how many there are."""
+    right = transfer.groupby("seed")["right"].first()
+    return int(right.sum()), len(right)
 
 
 def transfer_rows(transfer: pd.DataFrame) -> pd.DataFrame:
@@ -80,37 +102,53 @@ def transfer_rows(transfer: pd.DataFrame) -> pd.DataFrame:
 def draw(
     transfer: pd.DataFrame,
     transfer_values: pd.DataFrame,
+    cases: pd.DataFrame,
     regions: pd.DataFrame,
     dimensions: pd.DataFrame,
 ) -> Figure:
-    """Draw the truth with a safe set's border a strength, and the shares of each method."""
+    """Draw a line of panels a case: borders of safe sets, and the shares of each method."""
     if len(dimensions) != 2:
         raise Unsuited("borders of safe sets are drawn in two dimensions")
-    rows = transfer_rows(transfer)
-    figure, grid = new_figure(PAGE, 2.7, ncols=3, width_ratios=[1.5, 1, 1])
+    of_cases = with_cases(transfer, cases)
+    figure, grid = new_figure(
+        PAGE,
+        0.6 + 2.1 * len(of_cases),
+        nrows=len(of_cases),
+        ncols=3,
+        width_ratios=[1.5, 1, 1],
+        squeeze=False,
+    )
     with plt.rc_context(RC):
-        _borders(grid[0], transfer_values, Plane.of(regions, dimensions), regions)
-        for axes, (name, (title, unit)) in zip(grid[1:], _TITLES.items(), strict=True):
-            for method, (colour, mark) in _LOOKS.items():
-                each = rows[(rows["method"] == method) & rows[name].notna()]
-                value, low, high = (100 * each[f"{name}{end}"] for end in ("", "_low", "_high"))
-                style = {"color": colour, "marker": mark, "label": method}
-                axes.errorbar(
-                    each["strength"],
-                    value,
-                    [(value - low).clip(0), (high - value).clip(0)],
-                    **style,
-                )
-            axes.axvline(NOMINAL, color=GUIDE, linewidth=0.6, linestyle=":", zorder=0)
-            axes.set_ylim(-3, 103)
-            axes.set_title(title)
-            axes.set_xlabel("controls [nominal range]")
-            axes.set_ylabel(unit)
-        handles, labels = grid[2].get_legend_handles_labels()
-        handles += grid[0].get_legend_handles_labels()[0]
-        labels += grid[0].get_legend_handles_labels()[1]
+        for line, (case, rows) in zip(grid, of_cases.items(), strict=True):
+            region = rows["region"].mode()[0]
+            right, points = right_points(rows)
+            values = transfer_values[transfer_values["region"] == region]
+            _borders(line[0], values, Plane.of(regions, dimensions), regions)
+            line[0].set_title(
+                f"{case}\ninferred: region {region}, the truth in {right} of {points}"
+            )
+            _shares(line[1:], transfer_rows(rows))
+        handles, labels = grid[0][2].get_legend_handles_labels()
+        handles += grid[0][0].get_legend_handles_labels()[0]
+        labels += grid[0][0].get_legend_handles_labels()[1]
         figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
+
+
+def _shares(panels: Sequence[plt.Axes], rows: pd.DataFrame) -> None:
+    """A panel a share, a curve a method against the strength of controls."""
+    for axes, (name, (title, unit)) in zip(panels, _TITLES.items(), strict=True):
+        for method, (colour, mark) in _LOOKS.items():
+            each = rows[(rows["method"] == method) & rows[name].notna()]
+            value, low, high = (100 * each[f"{name}{end}"] for end in ("", "_low", "_high"))
+            style = {"color": colour, "marker": mark, "label": method}
+            lengths = [(value - low).clip(0), (high - value).clip(0)]
+            axes.errorbar(each["strength"], value, lengths, **style)
+        axes.axvline(NOMINAL, color=GUIDE, linewidth=0.6, linestyle=":", zorder=0)
+        axes.set_ylim(-3, 103)
+        axes.set_title(title)
+        axes.set_xlabel("controls [nominal range]")
+        axes.set_ylabel(unit)
 
 
 def _borders(axes: plt.Axes, values: pd.DataFrame, plane: Plane, regions: pd.DataFrame) -> None:
@@ -119,7 +157,6 @@ def _borders(axes: plt.Axes, values: pd.DataFrame, plane: Plane, regions: pd.Dat
         box.set(facecolor=TRUTH, alpha=0.5, edgecolor="none")
         axes.add_patch(box)
     plane.dress(axes)
-    axes.set_title("borders of the safe sets")
     styles = ("--", "-", ":", "-.")
     strengths = sorted(values["strength"].unique())
     for number, strength in enumerate(strengths):
@@ -145,23 +182,26 @@ def _borders(axes: plt.Axes, values: pd.DataFrame, plane: Plane, regions: pd.Dat
 def facts(
     transfer: pd.DataFrame,
     transfer_values: pd.DataFrame,
+    cases: pd.DataFrame,
     regions: pd.DataFrame,
     dimensions: pd.DataFrame,
 ) -> str:
     """What the caption says."""
     del transfer_values, regions, dimensions
-    right = transfer.groupby("seed")["right"].first() if "seed" in transfer else transfer["right"]
     lines = [
         "Orange: the truth. A region is inferred with the nominal control range and kept out of",
         "with others: by its own safe set, solved anew, or by the tube, the complement of its",
-        "nominal safe set. Entries: random controls that pass the filter; refused: of states that",
-        "can keep out for ever. Lines: Wilson's 95 % intervals; dotted: nominal range.",
-        f"The inferred region is the truth in {int(right.sum())} of {len(right)} points.",
+        "nominal safe set. Left: where the safe sets end. Entries: random controls that pass the",
+        "filter; refused: of states that can keep out for ever. Lines: Wilson's 95 % intervals;",
+        "dotted: nominal range. A line of panels a margin, of demonstrators and of filters.",
     ]
-    for row in transfer_rows(transfer).itertuples():
-        entered = "" if np.isnan(row.entered) else f"entered {100 * row.entered:.2f} %, "
-        lines.append(
-            f"  {row.strength:g} x the controls, {row.method}: {entered}refused "
-            f"{100 * row.refused:.1f} %"
-        )
+    for case, rows in with_cases(transfer, cases).items():
+        right, points = right_points(rows)
+        lines.append(f"{case}: the inferred region is the truth in {right} of {points} points.")
+        for row in transfer_rows(rows).itertuples():
+            entered = "" if np.isnan(row.entered) else f"entered {100 * row.entered:.2f} %, "
+            lines.append(
+                f"  {row.strength:g} x the controls, {row.method}: {entered}refused "
+                f"{100 * row.refused:.1f} %"
+            )
     return "\n".join(lines)

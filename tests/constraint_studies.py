@@ -27,23 +27,33 @@ def soft_tables() -> dict[str, pd.DataFrame]:
 
 
 def transfer_tables() -> dict[str, pd.DataFrame]:
-    """The tube lets in half of the trials with weak controls, and refuses half with strong ones."""
+    """The tube lets in half of the trials with weak controls, and refuses half with strong ones.
+
+    Two margins: with the derived one, which the setting leaves open, a neighbour is inferred, whose
+    own safe set lets in half with strong controls.
+    """
     rows = [
         {
-            "strength": strength,
+            "safety.margin": margin,
+            "truth": "c1",
             "seed": seed,
+            "strength": strength,
             "method": method,
-            "region": 5,
-            "right": True,
+            "region": 4 if np.isnan(margin) else 5,
+            "right": not np.isnan(margin),
             "safe": 100,
             "refused": {"tube": 50 if strength > 1 else 10, "no filter": 0}.get(method, 10),
             "doomed": 20,
             "admitted": {"tube": 10 if strength < 1 else 0, "no filter": 20}.get(method, 0),
             "trials": np.nan if method == "never entered" else 200,
-            "entered": {"tube": 100 if strength < 1 else 0, "no filter": 150}.get(method, 0)
-            if method != "never entered"
-            else np.nan,
+            "entered": {
+                "tube": 100 if strength < 1 else 0,
+                "no filter": 150,
+                "own safe set": 100 if strength > 1 and np.isnan(margin) else 0,
+                "never entered": np.nan,
+            }[method],
         }
+        for margin in (np.nan, 0.1)
         for strength in (0.5, 1.0, 2.0)
         for seed in (0, 1)
         for method in ("own safe set", "tube", "no filter", "never entered")
@@ -53,14 +63,20 @@ def transfer_tables() -> dict[str, pd.DataFrame]:
         pd.DataFrame(
             {
                 "truth": "c1",
+                "region": region,
                 "strength": strength,
                 "state_1": angle.ravel(),
                 "state_2": speed.ravel(),
-                "value": (np.abs(angle - np.pi) - np.abs(speed) / strength).ravel(),
+                "value": (np.abs(angle - np.pi - 5 + region) - np.abs(speed) / strength).ravel(),
             }
         )
+        for region in (4, 5)
         for strength in (0.5, 1.0, 2.0)
     ]
     of_truth = {"regions": region_rows(), "dimensions": dimension_rows()}
     one = {name: table[table["truth"] == "c1"] for name, table in of_truth.items()}
-    return {"transfer": pd.DataFrame(rows), "transfer_values": pd.concat(values), **one}
+    cases = pd.DataFrame({"safety.margin": [np.nan, 0.1], "truth": "c1", "choice": "margin"})
+    cases["value"] = ["derived", "0.1"]
+    cases["case"] = cases["choice"] + ": " + cases["value"]
+    tables = {"transfer": pd.DataFrame(rows), "transfer_values": pd.concat(values)}
+    return {**tables, "cases": cases, **one}

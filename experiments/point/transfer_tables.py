@@ -47,7 +47,7 @@ def transfer_tables(
         truth for ever, and how many of these the method refuses (`refused`); how many are `doomed`,
         not in the truth and yet not safe, and how many of those it lets through (`admitted`); of
         `trials` of random controls from states that it lets through, how many `entered` the truth.
-        `transfer_values`, a row a strength and state: the value of the region's safe set.
+        `transfer_values`, a row a `region`, strength and state: the value of its safe set.
     """
     inferred = int(point.inference.order[0])
     region = point.inference.hypotheses.select(
@@ -64,7 +64,8 @@ def transfer_tables(
         for method, row in deployment.rows(sets):
             opening = {"strength": strength, "method": method, "region": region.names[0]}
             rows.append({**opening, "right": right, **row})
-        values.append(_values(settings, sets[strength], strength))
+        opening = {"region": region.names[0], "strength": strength}
+        values.append(_values(settings, sets[strength], opening))
     return {"transfer": pd.DataFrame(rows), "transfer_values": pd.concat(values)}
 
 
@@ -162,7 +163,7 @@ def _solved(settings: Settings, store: Store, region: Regions, strength: float) 
     return SafeSet(grid, stored["values"], stored["gradients"])
 
 
-def _values(settings: Settings, safe_set: SafeSet, strength: float) -> pd.DataFrame:
+def _values(settings: Settings, safe_set: SafeSet, opening: dict[str, object]) -> pd.DataFrame:
     """Values of a safe set on a coarse grid, for a figure."""
     space = settings.model.space
     axes = [
@@ -171,4 +172,4 @@ def _values(settings: Settings, safe_set: SafeSet, strength: float) -> pd.DataFr
     ]
     states = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
     columns = {f"state_{d + 1}": states[:, d] for d in range(len(axes))}
-    return pd.DataFrame({"strength": strength, **columns, "value": safe_set.value(states)})
+    return pd.DataFrame({**opening, **columns, "value": safe_set.value(states)})

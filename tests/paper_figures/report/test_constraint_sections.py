@@ -29,8 +29,23 @@ def test_how_often_weights_are_in_their_intervals(tmp_path: Path) -> None:
 
 def test_what_is_let_in_and_what_is_refused(tmp_path: Path) -> None:
     text = section_transfer.section(results(tmp_path, "transfer", transfer_tables()))
-    assert "The inferred region is the truth in 2 of 2 points" in text
-    assert "lets in at most 0.00 % of trials at any strength; the target of 1 % is met" in text
-    assert "At 0.5 times the controls the tube lets in 50.0 %" in text
-    assert "At 2 times the controls the tube refuses 50.0 %" in text
-    assert "| 0.5 | never entered | - | 0.0 % [0.0, 8.8 %] | 10.0 % " in text
+    derived, narrow = (line for line in text.splitlines() if line.startswith("- "))
+    assert derived.startswith("- **margin: derived.**")
+    assert "The inferred region is the truth in 0 of 2 points: demonstrators who stay" in derived
+    assert (
+        "lets in at most 50.00 % of trials at any strength; the target of 1 % is missed" in derived
+    )
+    assert narrow.startswith("- **margin: 0.1.**")
+    assert "The inferred region is the truth in 2 of 2 points. Its own" in narrow
+    assert "lets in at most 0.00 % of trials at any strength; the target of 1 % is met" in narrow
+    assert "At 0.5 times the controls the tube lets in 50.0 % [45.1, 54.9 %] of trials" in narrow
+    assert "At 2 times the controls the tube lets in 0.0 % [0.0, 1.0 %] of trials and" in narrow
+    assert "refuses 50.0 % [43.1, 56.9 %] of safe states, the own safe set lets in 0.0 %" in narrow
+    assert "| margin: 0.1 | 0.5 | never entered | - | 0.0 % [0.0, 8.8 %] | 10.0 % " in text
+
+
+def test_transfer_of_points_that_are_of_no_case_is_missing(tmp_path: Path) -> None:
+    tables = transfer_tables()
+    some = results(tmp_path, "transfer", {**tables, "cases": tables["cases"][:1]})
+    with pytest.raises(Missing, match="cannot be read: some points are of no case"):
+        section_transfer.section(some)
