@@ -89,7 +89,7 @@ def draw(unfound: pd.DataFrame, chosen_tasks: pd.DataFrame) -> Figure:
 
 
 def title(truth: str) -> str:
-    """What a truth is called: C1, region 65, all truths."""
+    """What a truth is called: region 65 for `cell_65`, all truths, or its name in capitals."""
     if truth == ALL:
         return "all truths"
     return f"region {truth.removeprefix('cell_')}" if truth.startswith("cell_") else truth.upper()
