@@ -10,7 +10,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from paper_figures.rows import PAPER, Unsuited
-from paper_figures.style import GUIDE, PAGE, RC, TRUTH, new_figure
+from paper_figures.style import (
+    DEMONSTRATION,
+    GUIDE,
+    PAGE,
+    RC,
+    SAMPLED,
+    STEP_COLOURS,
+    TRUTH,
+    new_figure,
+)
 
 TABLES = {
     "baseline_differences": (
@@ -24,10 +33,10 @@ TABLES = {
 # Each method as the figure and the report call it, with its colour and mark.
 METHODS = {
     "ours": ("ours, with rates", TRUTH, "o"),
-    "paper": ("the paper's evidence", "#0072b2", "s"),
-    "visits": ("visitation difference", "#009e73", "^"),
-    "crossings": ("crossings of sampled paths", "#cc79a7", "v"),
-    "nearest": ("nearest unvisited", "#56b4e9", "D"),
+    "paper": ("the paper's evidence", DEMONSTRATION, "s"),
+    "visits": ("visitation difference", STEP_COLOURS[1], "^"),
+    "crossings": ("crossings of sampled paths", SAMPLED, "v"),
+    "nearest": ("nearest unvisited", STEP_COLOURS[0], "D"),
     "uniform": ("uniform", GUIDE, "x"),
 }
 _ASIDE = 0.02  # share of the number of demonstrations that neighbours are apart

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mlci.grids import Grid
-from mlci.reachability import solve_safe_set
 from mlci.regions import Regions
+from mlci.safety.reachability import solve_safe_set
 from mlci.spaces import Box, StateSpace
 from mlci.strength import WithStrength
 from mlci.systems import FunctionSystem, Pendulum, TelescopingPendulum
