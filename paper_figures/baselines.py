@@ -74,7 +74,7 @@ def draw(baseline_differences: pd.DataFrame) -> Figure:
             axes.set_xlabel("demonstrations")
         top.set_ylabel("truth in the top 5 [%]")
         top.set_ylim(-3, 103)
-        rank.set_ylabel("rank of the truth (geometric mean)")
+        rank.set_ylabel("rank of truth")
         rank.set_yscale("log")
         rank.set_yticks((1, 2, 5, 10, 20, 50), labels=["1", "2", "5", "10", "20", "50"])
         rank.yaxis.set_minor_locator(NullLocator())

@@ -78,7 +78,7 @@ def draw(unfound: pd.DataFrame, chosen_tasks: pd.DataFrame) -> Figure:
                     )
                 axes.axhline(50, color=GUIDE, linewidth=0.8, linestyle=":", zorder=0)
                 axes.set_ylim(-3, 103)
-            line[0].set_ylabel(f"not found [%]\n{WORDS[source]}")
+            line[0].set_ylabel(f"{WORDS[source]}\nnot found [%]")
         for truth, axes in zip(truths, grid[0], strict=True):
             axes.set_title(title(truth))
         for axes in grid[-1]:
