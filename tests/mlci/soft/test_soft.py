@@ -77,10 +77,23 @@ def test_merged_moves_weigh_as_single_ones_do(weight: float) -> None:
 
 
 def test_the_truth_stays_forbidden() -> None:
-    model = _pendulum().under([False, True])
-    free = TrajectoryDistribution(model, 70, np.arange(80, 120), 6)
-    of_task = soften(model, 0).task(free)
-    assert of_task.log_z(0.0) == pytest.approx(free.log_z[0, 70], abs=TOLERANCE)
+    model, start = _pendulum(), 20
+    everywhere = TrajectoryDistribution(model, start, np.arange(80, 120), 6)
+    free = replace(everywhere, model=model.under([False, True]))
+    of_task = soften(free.model, 0).task(free)
+    assert of_task.log_z(0.0) == pytest.approx(free.log_z[0, start], abs=TOLERANCE)
+    assert free.log_z[0, start] < everywhere.log_z[0, start] - 1  # the truth matters
+
+
+def test_paths_from_and_to_states_are_inside_the_region_of_the_model() -> None:
+    model = _pendulum((24, 24))
+    task = Task(np.array([3.5, 1.5]), Box([3.7, -4.0], [4.4, 4.0]), 1.0)
+    free = TrajectoryDistribution.of_task(model, task, exact_ends=True)
+    walled = replace(free, model=model.under([False, True]))
+    log_z = soften(model, 1).task(free).log_z(np.inf)
+    assert log_z == pytest.approx(walled.log_z[0, free.start], abs=TOLERANCE)
+    other = replace(free, model=model.under([True, False]))
+    assert abs(log_z - other.log_z[0, free.start]) > 0.01
 
 
 def test_what_cannot_be_softened_is_refused() -> None:

@@ -69,3 +69,10 @@ def test_a_recorded_path_by_hand() -> None:
         model.regions, 0, np.array(path) + np.array([[[0.0, 0.0]], [[0.0, 5.0]]]), 8.0
     )
     np.testing.assert_allclose(even, [2.0 * (0.5 + 1 + 1 + 0.5), 0.0])
+
+
+def test_a_path_that_went_round_is_inside_as_the_same_path_elsewhere() -> None:
+    """Half of it is in the box across the seam, however many turns it has behind it."""
+    path, turns = np.array([[5.3, 0.0], [6.3, 0.0]]), 2 * np.pi * np.arange(-2, 3)
+    paths = path + np.stack([turns, np.zeros(5)], axis=1)[:, None]
+    np.testing.assert_allclose(path_times(pendulum().regions, 1, paths, 3.0), np.full(5, 1.5))
