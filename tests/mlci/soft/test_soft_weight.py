@@ -204,3 +204,14 @@ def _planar() -> tuple[TabularModel, list[Demonstration]]:
     return model, [
         Demonstration.from_path(path, time) for path, time in zip(paths, times, strict=True)
     ]
+
+
+def test_a_region_that_cannot_be_avoided_has_a_weight_too() -> None:
+    """A start in the region: a wall leaves nothing, and a weight is still told by the times."""
+    soft = toy_world(0)
+    distribution = TrajectoryDistribution(soft.model, 3, GOALS, STEPS)
+    task = soft.task(distribution)
+    assert task.log_share(np.inf) == -np.inf
+    shares = tabulate_shares([task])
+    assert np.all(np.isfinite(shares.table))
+    assert shares.log_share(0.7) == pytest.approx(task.log_share(0.7), rel=SHARE)
