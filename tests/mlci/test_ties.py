@@ -121,6 +121,7 @@ def with_gains(model: TabularModel, avoidance: list[float]) -> Inference:
         ([0.2, 0.2, 0.2], 2, [1], [0]),
         ([0.2, 0.2, 0.5], 0, [1], []),  # `wall` explains much less: `fast` is no part of its tube
         ([0.25, 0.2, 0.2], 1, [2], []),  # 0.22 nat tell `fast` from the others
+        ([0.25, 0.5, 0.2], 2, [], []),  # and `wall` from `fast`, though it lies in its tube
         ([0.0, 0.3, 0.0], 2, [], [0]),  # what nothing avoids ties
         ([1.0, 1.0, 1.0], 0, [], []),  # nothing is explained
     ],

@@ -11,6 +11,7 @@ from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
 from mlci.soft.distribution import SoftModel, soften
+from mlci.soft.time_inside import move_times
 from mlci.spaces import Box
 from mlci.systems import Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize
@@ -92,7 +93,9 @@ def test_paths_from_and_to_states_are_inside_the_region_of_the_model() -> None:
     task = Task(np.array([3.5, 1.5]), Box([3.7, -4.0], [4.4, 4.0]), 1.0)
     free = TrajectoryDistribution.of_task(model, task, exact_ends=True)
     walled = replace(free, model=model.under([False, True]))
-    log_z = soften(model, 1).task(free).log_z(np.inf)
+    softened = soften(model, 1)
+    np.testing.assert_array_equal(softened.times, move_times(model, 1))
+    log_z = softened.task(free).log_z(np.inf)
     assert log_z == pytest.approx(walled.log_z[0, free.start], abs=TOLERANCE)
     other = replace(free, model=model.under([True, False]))
     assert abs(log_z - other.log_z[0, free.start]) > 0.01
