@@ -55,9 +55,23 @@ def truth_problems(settings: Settings) -> Iterator[str]:
             f"calibration.sets: {calibration.sets}, but truths are drawn as equally probable, not "
             f"by inference.size_prior={settings.inference.size_prior:g}; set that to 0, or 0 sets"
         )
+    yield from _questions_without_truth(settings)
     for i, region in enumerate(truth.boxes):
         if all(side is None for side in region.lower):
             yield f"truth.boxes[{i}]: forbids every state; give ends to at least one dimension"
+
+
+def _questions_without_truth(settings: Settings) -> Iterator[str]:
+    """What is asked of a truth, where nothing is forbidden."""
+    asked = {
+        "next_task.repetitions": (settings.next_task.repetitions, 0),
+        "areas.subsets": (settings.areas.subsets, 0),
+        "soft.weights": (list(settings.soft.weights), []),
+        "transfer.strengths": (list(settings.transfer.strengths), []),
+    }
+    for key, (value, nothing) in asked.items():
+        if value and settings.truth.name == NO_TRUTH:
+            yield f"{key}: {value}, but no truth is there to ask about; set it to {nothing}"
 
 
 def hypothesis_problems(settings: Settings) -> Iterator[str]:

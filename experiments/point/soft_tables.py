@@ -41,6 +41,8 @@ def soft_table(settings: Settings, point: PointInference) -> pd.DataFrame:
         )
         if each.is_possible
     ]
+    if not possible:
+        return pd.DataFrame(columns=COLUMNS)
     shares = tabulate_shares([softened.task(each) for each in possible])
     rows = []
     for number, weight in enumerate(settings.soft.weights):

@@ -93,7 +93,7 @@ def point_tables(
         tables |= area_tables(settings, point)
     if settings.next_task.repetitions:
         tables["next_task"] = next_task_table(settings, point)
-    if settings.soft.sets:
+    if settings.soft.weights:
         tables["soft"] = soft_table(settings, point)
     return tables
 

@@ -9,7 +9,6 @@ from pydantic.dataclasses import dataclass
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
-    CountOrNone,
     NotNegative,
     Positive,
     about,
@@ -22,15 +21,16 @@ class SoftSettings:
     """Can the weight of a soft constraint be told? For truths of one region."""
 
     sets: Annotated[
-        CountOrNone,
+        Count,
         about(
             "sets of demonstrations drawn from the tabular model under each weight, whose weight "
-            "is estimated; 0 asks nothing"
+            "is estimated"
         ),
     ]
     demonstrations: Annotated[Shape, about("so many demonstrations are in each set")]
     weights: Annotated[
-        tuple[NotNegative, ...], about("costs of the time inside the truth", "nat/s")
+        tuple[NotNegative, ...],
+        about("costs of the time inside the truth; none asks nothing", "nat/s"),
     ]
 
 

@@ -101,7 +101,7 @@ def changed(value: Any, name: str = "") -> Iterator[Any]:
     elif isinstance(value, str):
         yield {"equation": "escapes", "euler": "rk4", "rk4": "euler"}.get(value, f"{value}2")
     elif isinstance(value, tuple):
-        yield value[:-1] if len(value) > 1 else value * 2
+        yield value[:-1] if len(value) > 1 else value * 2 or (0.25,)
     elif value is None:
         yield IN_PLACE_OF_NONE.get(name, (0.25,))
     else:
@@ -137,7 +137,7 @@ COMMANDS = [
     ("dtt=0.2", "dtt: unknown key; did you mean dt?"),
     ("demonstrations.pars=3", "demonstrations.pars: unknown key; did you mean pairs?"),
     ("system.gravty=2", "system.gravty: unknown key; did you mean gravity?"),
-    ("grid=300", "grid: there is no 300; there are 100, 400, 900, 1600, 2500"),
+    ("grid=300", "grid: there is no 300; there are 100, 400, 576, 900, 1600, 2500"),
     ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, pain, wall"),
     ("grdi=100", "grdi: unknown key; did you mean grid?"),
     ("dt=[1", "dt=[1: cannot be read as key=value"),
@@ -375,7 +375,7 @@ def test_all_wrong_points_of_a_sweep_are_reported_at_once(
     [
         (
             ["-m", "grid=100,300"],
-            "grid: there is no 300; there are 100, 400, 900, 1600, 2500 [1 of 2",
+            "grid: there is no 300; there are 100, 400, 576, 900, 1600, 2500 [1 of 2",
         ),
         (["-m", "experiment=paper,other"], "experiment=paper,other: a sweep over experiments"),
         (["-m", "study=a,b"], "study=a,b: this changes no result"),

@@ -15,6 +15,9 @@ from experiments.point import forecasts, stages, trials
 from experiments.tracking.trees import canonical_json, flatten, plain
 
 BASE = ["grid.shape=[6,5]", "safety.shape=[21,21]"]
+BALL = "[{center: [3.4, 0.6], radii: [0.3, 0.6]}]"
+HALF_SPACE = "[{normal: [0.0, 1.0], offset: 1.5}]"
+SHAPE = "[{_target_: mlci.shapes.half_spaces.HalfSpace, normal: [0.0, 1.0], offset: 1.5}]"
 BOX = "[{lower: [3.2, 0.0], upper: [3.8, 1.2]}]"
 ALL = {"safe_set", "demonstrations", "mdp", "mdp_truth", "forecasts"}
 TRUTH, MODEL = {"safe_set", "demonstrations", "mdp_truth"}, {"mdp", "mdp_truth", "forecasts"}
@@ -34,6 +37,9 @@ CHANGES = {
     "action_range": ("action_range=[[-6.0,6.0]]", MODEL),
     "hypotheses.shape": ("hypotheses.shape=[10,20]", {"mdp", "forecasts"}),
     "hypotheses.boxes": (f"hypotheses.boxes={BOX}", {"mdp", "forecasts"}),
+    "hypotheses.balls": (f"hypotheses.balls={BALL}", {"mdp", "forecasts"}),
+    "hypotheses.half_spaces": (f"hypotheses.half_spaces={HALF_SPACE}", {"mdp", "forecasts"}),
+    "hypotheses.shapes": (f"hypotheses.shapes={SHAPE}", {"mdp", "forecasts"}),
     "grid.shape": ("grid.shape=[6,7]", MODEL),
     "grid.offset": ("grid.offset=[0.5,0.0]", MODEL),
     "dt": ("dt=0.5", MODEL),
@@ -44,12 +50,20 @@ CHANGES = {
     "inference.calibrate": ("inference.calibrate=false", NOTHING),
     "inference.model_error": ("inference.model_error=0.2", NOTHING),
     "inference.rule_breaking": ("inference.rule_breaking=0.2", NOTHING),
+    "inference.size_prior": ("inference.size_prior=1.0", NOTHING),
+    "inference.sets.largest": ("inference.sets.largest=2", NOTHING),
+    "inference.sets.further": ("inference.sets.further=0.5", NOTHING),
+    "inference.sets.adjacency": ("inference.sets.adjacency=0.5", NOTHING),
+    "inference.sets.steps": ("inference.sets.steps=100", NOTHING),
     "tasks.lower": ("tasks.lower=[null,-1.0]", DEMONSTRATOR),
     "tasks.upper": ("tasks.upper=[null,1.0]", DEMONSTRATOR),
     "tasks.goal": ("tasks.goal=[0.1,null]", DEMONSTRATOR),
     "tasks.crossing": ("tasks.crossing=true", REAL),
     "truth.name": ("truth.name=another", NOTHING),  # a word in tables
     "truth.boxes": ("truth.boxes=[{lower: [3.1, 0.0], upper: [3.9, 1.2]}]", TRUTH),
+    "truth.balls": (f"truth.balls={BALL}", TRUTH),
+    "truth.half_spaces": (f"truth.half_spaces={HALF_SPACE}", TRUTH),
+    "truth.shapes": (f"truth.shapes={SHAPE}", TRUTH),
     "truth.cell": ("truth=cell truth.cell=37", TRUTH),
     "horizon": ("horizon=4.0", DEMONSTRATOR),
     "demonstrations.pairs": ("demonstrations.pairs=90", REAL),
@@ -84,6 +98,16 @@ CHANGES = {
     "next_task.pool": ("next_task.pool=7", NOTHING),
     "next_task.most": ("next_task.most=7", NOTHING),
     "next_task.samples": ("next_task.samples=7", NOTHING),
+    "areas.subsets": ("areas.subsets=3", NOTHING),
+    "areas.demonstrations": ("areas.demonstrations=[2]", NOTHING),
+    "areas.log_odds": ("areas.log_odds=-2.0", NOTHING),
+    "areas.adjacency": ("areas.adjacency=0.25", NOTHING),
+    "soft.sets": ("soft.sets=7", NOTHING),
+    "soft.demonstrations": ("soft.demonstrations=[2]", NOTHING),
+    "soft.weights": ("soft.weights=[1.0]", NOTHING),
+    "transfer.strengths": ("transfer.strengths=[2.0]", NOTHING),
+    "transfer.trials": ("transfer.trials=7", NOTHING),
+    "transfer.states": ("transfer.states=7", NOTHING),
     "rollouts": ("rollouts=3", NOTHING),
     "misfit": ("misfit=99", NOTHING),
     "seed": ("seed=1", REAL),

@@ -159,6 +159,20 @@ def test_rules_need_a_truth() -> None:
         settings_of("truth=none", "demonstrations.rule_breaking=0.1")
 
 
+@pytest.mark.parametrize(
+    "word",
+    [
+        "next_task.repetitions=1",
+        "areas.subsets=1",
+        "soft.weights=[1.0]",
+        "transfer.strengths=[2.0]",
+    ],
+)
+def test_questions_of_a_truth_need_one(word: str) -> None:
+    with pytest.raises(ConfigError, match="no truth is there to ask about; set it to"):
+        settings_of("truth=none", word)
+
+
 def test_arguments_that_change_nothing_are_no_other_reality() -> None:
     plain, same = settings_of(), settings_of("reality.system={length: 1, drag: 0}")
     assert same == plain

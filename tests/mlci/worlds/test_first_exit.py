@@ -157,5 +157,5 @@ def test_a_circle_of_positive_reward_diverges() -> None:
 
 
 def test_chance_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"are for mlci\.causal_entropy"):
+    with pytest.raises(ValueError, match=r"are for mlci\.worlds\.causal_entropy"):
         _ = FirstExit(chancy_world()).log_z
