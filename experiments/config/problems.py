@@ -37,6 +37,7 @@ _WORDS = {
     "less_than": "{value} must be below {lt:.16g}",
     "less_than_equal": "{value} must be at most {le:.16g}",
     "too_short": "{value} is empty; give at least one",
+    "too_long": "{value} has {actual_length} entries; give {max_length}",
     "problem": "{words}",
 }
 
@@ -89,9 +90,10 @@ def field_keys(kind: Any, prefix: str = "") -> list[str]:
 def _lines(error: ValidationError, kind: Any, tree: Mapping[str, Any]) -> Iterator[str]:
     """A line for each of the errors."""
     for each in error.errors(include_url=False):
-        place = [part for part in each["loc"] if part not in (ONE, LIST, WORD)]
+        place = [part for part in each["loc"] if part not in (ONE, LIST, WORD, "[key]")]
         key = _dotted(place) or "config"
-        if each["type"] == "too_short" and each["input"]:
+        least = each.get("ctx", {}).get("min_length", 0)
+        if each["type"] == "too_short" and len(each["input"]) >= least:
             continue  # entries that are wrong do not count, and have lines of their own
         if each["type"] in ("unexpected_keyword_argument", "extra_forbidden", "invalid_key"):
             yield f"{key}: {_unknown(place, kind, tree)}"
@@ -100,6 +102,8 @@ def _lines(error: ValidationError, kind: Any, tree: Mapping[str, Any]) -> Iterat
             yield f"{key}: missing; {name} needs it"
         elif each["type"] == "dataclass_type" and each["ctx"]["class_name"] in _EXAMPLES:
             yield f"{key}: {_short(each['input'])} {_EXAMPLES[each['ctx']['class_name']]}"
+        elif each["type"] == "too_short" and least > 1:
+            yield f"{key}: {_short(each['input'])} has too few entries; give {least}"
         elif each["type"] in _WORDS:
             details = {**each.get("ctx", {}), "value": _short(each["input"])}
             yield f"{key}: " + _WORDS[each["type"]].format(**details)
@@ -114,9 +118,18 @@ def _unknown(place: list[Any], kind: Any, tree: Mapping[str, Any]) -> str:
         system = system_class(tree["system"]["_target_"])
         known = did_you_mean(name, inspect.signature(system).parameters)
         return f"{system.__name__} has no such argument{known}"
-    above = "".join(f"{part}." for part in parents if isinstance(part, str))
-    beside = [key.removeprefix(above) for key in field_keys(kind) if key.startswith(above)]
-    return f"unknown key{did_you_mean(name, [key for key in beside if '.' not in key])}"
+    return f"unknown key{did_you_mean(name, _keys_below(kind, parents))}"
+
+
+def _keys_below(kind: Any, place: list[Any]) -> list[str]:
+    """Names of the fields at a place, which may lead through groups, lists and named groups."""
+    parts = iter(part for part in place if isinstance(part, str))
+    for part in parts:
+        hint = typing.get_type_hints(kind).get(part)
+        if typing.get_origin(hint) is dict:
+            next(parts, None)  # a name that the config gives
+        kind = _group(hint)
+    return list(typing.get_type_hints(kind)) if kind else []
 
 
 def _group(hint: Any) -> Any:
@@ -136,7 +149,8 @@ def _without_missing(tree: Any) -> Any:
 def _dotted(place: list[Any]) -> str:
     """A key as one writes it, such as truth.boxes[0].lower."""
     parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in place)
-    return "".join(parts).removeprefix(".")
+    text = "".join(parts).removeprefix(".")
+    return text if text.isprintable() else repr(text)
 
 
 def _short(value: object) -> str:

@@ -40,6 +40,7 @@ from experiments.config.shape_checks import (
     point_shape_problems,
     recorded_shape_problems,
     shape_problems,
+    table_problems,
 )
 from experiments.config.truth_checks import (
     hypothesis_problems,
@@ -137,7 +138,9 @@ def read_table_config(tree: Mapping[str, Any]) -> TableSettings:
             **tree,
             "inference": _without(rates, ("exact_ends", "calibrate", "size_prior", "sets")),
         }
-    return checked(TableSettings, tree)
+    settings = checked(TableSettings, tree)
+    _refuse(table_problems(settings))
+    return settings
 
 
 def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:

@@ -19,6 +19,7 @@ from experiments.config.settings import (
     Settings,
     ShapeList,
     SubjectSettings,
+    TableSettings,
     TaskBoxSettings,
 )
 from mlci.shapes.shape import as_shape, checked_hull
@@ -52,9 +53,8 @@ def advice_shape_problems(settings: AdviceSettings) -> Iterator[str]:
 
 def recorded_shape_problems(settings: RecordedSettings) -> Iterator[str]:
     """Recordings that are not named, and what does not match the system."""
-    space, given = settings.model.space, settings.demonstrations
-    if not given or not all([given] if isinstance(given, str) else given):
-        yield "demonstrations: empty; name a folder, a pattern or a file"
+    space = settings.model.space
+    yield from _demonstration_problems(settings.demonstrations)
     names = {"units": space.names, "columns": ("time", "states", *space.names)}
     if settings.group_by:  # whose columns may have other names too
         del names["columns"]
@@ -74,6 +74,19 @@ def recorded_shape_problems(settings: RecordedSettings) -> Iterator[str]:
                 f"derive: {{{name}: {of}}} is no state ({', '.join(space.names)}) as the "
                 f"derivative of another; an example is {{{space.names[-1]}: {space.names[0]}}}"
             )
+
+
+def table_problems(settings: TableSettings) -> Iterator[str]:
+    """A world or recordings that are not named."""
+    if not settings.table:
+        yield "table: empty; name the file of a world, such as table=grid/world.yaml"
+    yield from _demonstration_problems(settings.demonstrations)
+
+
+def _demonstration_problems(given: str | tuple[str, ...]) -> Iterator[str]:
+    """Recordings that are not named."""
+    if not given or not all([given] if isinstance(given, str) else given):
+        yield "demonstrations: empty; name a folder, a pattern or a file"
 
 
 def _reality_problems(settings: Settings) -> Iterator[str]:

@@ -5,16 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 
+from experiments.config.memory import machine_memory
 from experiments.config.problems import ConfigError, checked
 from experiments.config.settings.world import WorldSettings, names_of
+from experiments.config.yaml_text import read_yaml
 from mlci.recordings.moves import Moves, read_moves
+from mlci.recordings.recording import shown_path
 from mlci.recordings.rows import canonical, number_of
+from mlci.worlds.causal_entropy import states_without_goal
+from mlci.worlds.first_exit import FirstExit
+from mlci.worlds.inference import is_certain
 from mlci.worlds.tables import Table, TableRegion
+from mlci.worlds.transitions import WRITTEN
+
+_BYTES_A_STEP = 24  # and state: log Z or values, and copies while they are read
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,29 +51,18 @@ def read_world(file: str | Path) -> World:
     Raises:
         ConfigError: what is wrong, in which file.
     """
-    path = Path(file).expanduser()
-    try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise ConfigError(f"{file}: cannot be read ({error.strerror or error})") from None
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{file}: byte {error.start} is not UTF-8") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f", line {mark.line + 1}" if mark else ""
-        raise ConfigError(f"{file}{line}: not valid YAML") from None
+    tree = read_yaml(file)
     if not isinstance(tree, dict):
         raise ConfigError(f"{file}: holds no keys with values, such as moves: moves.csv")
     try:
         settings = checked(WorldSettings, tree)
     except ConfigError as error:
         raise ConfigError("\n".join(f"{file}: {line}" for line in str(error).split("\n"))) from None
+    table = Path(file).expanduser().parent / settings.moves
     try:
-        moves = read_moves(
-            path.parent / settings.moves, names_of(settings.states), names_of(settings.actions)
-        )
+        moves = read_moves(table, names_of(settings.states), names_of(settings.actions))
     except ValueError as error:
-        raise ConfigError(f"{path.parent / settings.moves}: {error}") from None
+        raise ConfigError(f"{shown_path(table)}: {error}") from None
     try:
         return _world(settings, moves)
     except ValueError as error:
@@ -86,18 +82,24 @@ def _world(settings: WorldSettings, moves: Moves) -> World:
             f"reward: give one of all moves here, or rewards in {settings.moves}, and not both"
         )
     reward = np.float64(settings.reward) if moves.reward is None else moves.reward
-    begins: Any = np.zeros(len(moves.states))
-    if isinstance(settings.start, str):
-        begins = state(settings.start, "start")
-    else:
-        for name, probability in settings.start.items():
-            begins[state(name, "start")] += probability
+    with np.errstate(over="ignore"):  # refused below, as too large
+        rewards = reward / settings.temperature
+    begins = np.zeros(len(moves.states))
+    given = {settings.start: 1.0} if isinstance(settings.start, str) else settings.start
+    for name, probability in given.items():
+        begins[state(name, "start")] += probability
+    if not abs(float(np.sum(begins)) - 1) <= WRITTEN:
+        raise ValueError(
+            f"start: probabilities must add up to 1, not {np.sum(begins):.9g}; write a state, or "
+            "{state: probability, ...}"
+        )
     table = Table.from_arrays(
         moves.transitions,
-        reward / settings.temperature,
+        rewards,
         begins,
         [state(name, "goals") for name in settings.goal_names],
     )
+    _refuse_endless(settings, moves, table)
     regions = dict(_regions(settings, moves, table, state, action))
     if not regions:
         raise ValueError("hypotheses: there are none; give each: [states], or sets")
@@ -109,6 +111,34 @@ def _world(settings: WorldSettings, moves: Moves) -> World:
         settings.discount,
         settings.temperature,
     )
+
+
+def _refuse_endless(settings: WorldSettings, moves: Moves, table: Table) -> None:
+    """Refuse a world in which paths of any length cannot end, and one of too many steps.
+
+    Raises:
+        ValueError: what is wrong.
+    """
+    steps = settings.horizon or 0
+    if (memory := steps * table.states * _BYTES_A_STEP) > machine_memory():
+        raise ValueError(
+            f"horizon: {steps} moves among {table.states} states take about {memory / 1e9:.3g} GB, "
+            f"more than the {machine_memory() / 1e9:.3g} GB of this machine; take fewer, or null"
+        )
+    if steps or settings.discount < 1:
+        return
+    if not len(table.goals):
+        raise ValueError("goals: there are none, so that no path ends; give goals, or a horizon")
+    if is_certain(table):
+        lost = np.flatnonzero(table.start) if FirstExit(table).hopeless else np.array([], dtype=int)
+    else:
+        lost = states_without_goal(table)
+    if len(lost):
+        some = ", ".join(repr(moves.states[i]) for i in lost[:8]) + ", ..." * (len(lost) > 8)
+        raise ValueError(
+            f"goals: none can be reached from state {some}, where the start leads; give other "
+            "goals, or a horizon"
+        )
 
 
 def _regions(
@@ -130,20 +160,24 @@ def _regions(
             (f"{moves.actions[a]} in {moves.states[s]}", TableRegion(moves=[(s, a)]))
             for s, a in np.argwhere(table.allowed).tolist()
         ]
-    yield from single
     taken = dict(single)
+    yield from taken.items()
     for name, one in sets.items():
         where = f"hypotheses.sets.{name}"
         if name in taken:
             raise ValueError(f"{where}: a hypothesis of `each` has this name; take another")
         if not (one.states or one.actions or one.moves):
             raise ValueError(f"{where}: forbids nothing; give states, actions or moves")
+        pairs = [(state(s, where), action(a, where)) for s, a in one.moves]
+        for (s, a), (state_name, action_name) in zip(pairs, one.moves, strict=True):
+            if not table.allowed[s, a]:
+                raise ValueError(f"{where}: there is no move {action_name!r} in {state_name!r}")
         yield (
             name,
             TableRegion(
                 [state(each_state, where) for each_state in one.states],
                 [action(each_action, where) for each_action in one.actions],
-                [(state(s, where), action(a, where)) for s, a in one.moves],
+                pairs,
             ),
         )
 

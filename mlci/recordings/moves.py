@@ -18,7 +18,7 @@ import scipy  # loads scipy.sparse when it is first used
 from mlci.recordings.rows import Rows, canonical, number_of, read_rows
 from mlci.recordings.table import Unusable
 from mlci.spaces import Floats, Ints
-from mlci.worlds.transitions import as_transitions
+from mlci.worlds.transitions import MOST_MOVES, WRITTEN, as_transitions
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +73,11 @@ def read_moves(file: str | Path, states: Sequence[str] = (), actions: Sequence[s
     row = state * len(action_names) + action
     chance = _floats(rows, "probability") if "probability" in columns else np.ones(len(row))
     shape = len(state_names) * len(action_names), len(state_names)
+    if shape[0] > MOST_MOVES:
+        raise Unusable(
+            f"{len(state_names)} states of {len(action_names)} actions take too much memory: use "
+            "names of actions again, where they are taken in other states"
+        )
     _refuse_repetition(rows, row, following)
     _refuse_wrong_sum(rows, row, chance)
     reward = None
@@ -84,6 +89,8 @@ def read_moves(file: str | Path, states: Sequence[str] = (), actions: Sequence[s
 
 def _of_arrays(file: Path, states: Sequence[str], actions: Sequence[str]) -> Moves:
     """The moves of an .npz file."""
+    if file.exists() and not file.is_file():
+        raise Unusable("is not a file")
     try:
         with np.load(file, allow_pickle=False) as arrays:
             content = {name: arrays[name] for name in arrays.files}
@@ -108,6 +115,8 @@ def _of_arrays(file: Path, states: Sequence[str], actions: Sequence[str]) -> Mov
         names.append(tuple(given_names) or tuple(map(str, range(size))))
     reward = content.get("reward")
     if reward is not None:
+        if reward.dtype.kind not in "biuf":
+            raise Unusable(f"has a reward of {reward.dtype}, not of numbers")
         try:
             reward = np.broadcast_to(np.asarray(reward, dtype=float), shape).copy()
         except ValueError:
@@ -164,13 +173,15 @@ def _refuse_repetition(rows: Rows, row: Ints, following: Ints) -> None:
 def _refuse_wrong_sum(rows: Rows, row: Ints, chance: Floats) -> None:
     """Refuse moves whose probabilities do not add up to 1."""
     total = np.bincount(row, weights=chance)[row]
-    wrong = np.flatnonzero((chance < 0) | (np.abs(total - 1) > 1e-6))
-    if len(wrong):
+    if len(negative := np.flatnonzero(chance < 0)):
+        entry = rows.columns["probability"][negative[0]]
+        raise Unusable(f"line {rows.lines[negative[0]]}: probability {entry} is negative")
+    if len(wrong := np.flatnonzero(np.abs(total - 1) > WRITTEN)):
         i = wrong[0]
         move = f"{rows.columns['action'][i]!r} in state {rows.columns['state'][i]!r}"
         raise Unusable(
             f"line {rows.lines[i]}: probabilities of what follows action {move} add up to "
-            f"{total[i]:g}, not 1"
+            f"{total[i]:.9g}, not 1"
             + ("; a column probability tells them" if "probability" not in rows.columns else "")
         )
 

@@ -40,17 +40,26 @@ def read_rows(file: Path, needed: Sequence[str], others: Sequence[str] = ()) -> 
             a row of another length.
     """
     try:
+        if file.exists() and not file.is_file():
+            raise Unusable("is not a file")
         lines = text_lines(file)
     except FileNotFoundError:
         raise Unusable("there is no such file") from None
-    except OSError as error:
-        raise Unusable(f"cannot be read ({error.strerror or error})") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, Unusable):
+            raise
+        reason = getattr(error, "strerror", None) or error  # such as a zero byte in the name
+        raise Unusable(f"cannot be read ({reason})") from None
     full = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
     if not full:
         raise Unusable("is empty")
     head = lines[full[0]]
     delimiter = next((sign for sign in _DELIMITERS if sign in head), ",")
-    rows = list(csv.reader((lines[i] for i in full), delimiter=delimiter, skipinitialspace=True))
+    content = (lines[i] for i in full)
+    try:
+        rows = list(csv.reader(content, delimiter=delimiter, skipinitialspace=True))
+    except csv.Error as error:
+        raise Unusable(f"cannot be taken apart ({error}); does it hold a single quote?") from None
     if len(rows) != len(full):
         raise Unusable("has a quote that goes on to the next line")
     header = rows[0]

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 import scipy  # loads scipy.special and scipy.sparse when they are first used
 
-from mlci.spaces import Bools, Floats
+from mlci.spaces import Bools, Floats, Ints
 from mlci.worlds.flows import fixed_point, reached
 from mlci.worlds.tables import Table, TablePath
 
@@ -159,8 +159,11 @@ class CausalEntropy:
         values[self.table.goals] = 0.0
         if not np.any(lives := values == 0.0):
             return values
-        if self.discount == 1:
-            _require_goals(lasting.table)
+        if self.discount == 1 and len(lost := _without_goal(lasting.table)):
+            raise ValueError(
+                f"no goal can be reached from state {lost[0]}, which the start leads to: discount, "
+                "or fix a horizon"
+            )
         policy = allowed / np.maximum(np.sum(allowed, axis=1, keepdims=True), 1)
         for _ in range(_IMPROVEMENTS):
             entropy = -np.sum(scipy.special.xlogy(policy, policy), axis=1)
@@ -193,15 +196,16 @@ def _lasting_moves(table: Table) -> Bools:
     return allowed & ahead[:, None]
 
 
-def _require_goals(table: Table) -> None:
-    """Raise where nothing is discounted and a state that lasts leads to no goal."""
-    row, successor = (table.transitions.multiply(table.allowed.reshape(-1, 1))).nonzero()
-    back = reached(table.goals, successor, row // table.actions, table.states)
-    if np.any(lost := table.allowed.any(axis=1) & ~back):
-        raise ValueError(
-            f"no goal can be reached from state {int(np.argmax(lost))}, which the start leads to: "
-            "discount, or fix a horizon"
-        )
+def states_without_goal(table: Table) -> Ints:
+    """States that a policy may come to from the start, go on from for ever, and meet no goal."""
+    return _without_goal(replace(table, allowed=_lasting_moves(table)))
+
+
+def _without_goal(lasting: Table) -> Ints:
+    """The same, of a table whose moves all last."""
+    row, successor = (lasting.transitions.multiply(lasting.allowed.reshape(-1, 1))).nonzero()
+    back = reached(lasting.goals, successor, row // lasting.actions, lasting.states)
+    return np.flatnonzero(lasting.allowed.any(axis=1) & ~back)
 
 
 def _soft_policy(action_values: Floats) -> Floats:

@@ -137,6 +137,12 @@ class FirstExit:
                 result[:, column] = FirstExit(table.under(one)).log_z[starts] - self.log_z[starts]
         return result
 
+    @property
+    def hopeless(self) -> bool:
+        """Whether no goal can be reached from any start."""
+        state = self._moves[0]
+        return not np.any(self.table.start[np.append(state, self.table.goals)])
+
     def _require_possible(self, starts: Ints) -> None:
         """Raise where there is no distribution."""
         if np.any(stuck := self.log_z[starts] == -np.inf):

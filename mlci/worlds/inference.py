@@ -169,6 +169,11 @@ def _of_policies(
     """(N, C) log probability under each hypothesis, less that under none."""
     agent = CausalEntropy(table, steps, discount)
     nominal = np.array([agent.log_probability(path) for path in paths])
+    if np.any(lost := nominal == -np.inf):
+        raise ValueError(
+            f"{paths[int(np.argmax(lost))].title} goes where the agent cannot but come, by chance, "
+            "to a state without moves that is no goal; give that state a move, or make it a goal"
+        )
     ratio = np.full((len(paths), len(table.regions)), -np.inf)
     for i, one in enumerate(_constrained(table)):
         constrained = CausalEntropy(one, steps, discount)

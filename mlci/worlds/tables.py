@@ -17,7 +17,9 @@ from numpy.typing import ArrayLike
 
 from mlci.regions import as_mask
 from mlci.spaces import Bools, Floats, Ints
-from mlci.worlds.transitions import ROUNDING, as_transitions, in_range
+from mlci.worlds.transitions import ROUNDING, WRITTEN, as_transitions, in_range
+
+_LARGEST_REWARD = 1e9  # [nat] whose sums are right to about 1e-6
 
 
 @dataclass(frozen=True)
@@ -121,8 +123,11 @@ class Table:
         shape = states, chances.shape[0] // states
         rewards = np.array(np.broadcast_to(np.asarray(reward, dtype=float), shape))
         there = np.diff(chances.indptr).reshape(shape) > 0
-        if not np.all(np.isfinite(rewards[there])):
-            raise ValueError("rewards of moves must be finite")
+        if not np.all(fine := np.abs(rewards[there]) <= _LARGEST_REWARD):
+            raise ValueError(
+                f"rewards over temperature must lie within {_LARGEST_REWARD:g} nat, so that their "
+                f"sums keep their digits; one is {rewards[there][~fine][0]:g}"
+            )
         ends = in_range(np.atleast_1d(np.asarray(goals, dtype=np.int64)), states, "goals")
         there[ends] = False
         named = dict(regions or {})
@@ -233,12 +238,12 @@ def _distribution(start: int | ArrayLike, states: int) -> Floats:
         return begins
     begins = array.astype(float)
     total = float(np.sum(begins))
-    if begins.shape != (states,) or np.any(begins < 0) or not abs(total - 1) <= ROUNDING:
+    if begins.shape != (states,) or np.any(begins < 0) or not abs(total - 1) <= WRITTEN:
         raise ValueError(
             f"a start is a state, or ({states},) probabilities that add up to 1, not "
-            f"{begins.shape} that add up to {total:g}"
+            f"{begins.shape} that add up to {total:.9g}"
         )
-    return begins
+    return begins / total if abs(total - 1) > ROUNDING else begins
 
 
 def _crossings(

@@ -8,7 +8,9 @@ from numpy.typing import ArrayLike
 
 from mlci.spaces import Ints
 
-ROUNDING = 1e-9  # how far probabilities may be from adding up to 1
+WRITTEN = 1e-6  # how far probabilities in few digits, or of float32, may be from adding up to 1
+ROUNDING = 1e-9  # those that are nearer are as they should be; others are scaled
+MOST_MOVES = 200_000_000  # S * A: arrays of that many numbers take gigabytes
 
 
 def as_transitions(transitions: ArrayLike | scipy.sparse.csr_matrix) -> scipy.sparse.csr_matrix:
@@ -20,15 +22,19 @@ def as_transitions(transitions: ArrayLike | scipy.sparse.csr_matrix) -> scipy.sp
 
     Raises:
         ValueError: another shape, successors that are no states, probabilities that are negative or
-            do not add up to 1, or to 0.
+            do not add up to 1, or to 0. In a sparse array, indices that are out of range.
     """
     if scipy.sparse.issparse(transitions):
-        chances = scipy.sparse.csr_matrix(transitions, dtype=float, copy=True)
+        given = scipy.sparse.csr_matrix(transitions)
+        if given.dtype.kind not in "biuf":
+            raise ValueError(f"transitions are real numbers, not {given.dtype}")
+        chances = given.astype(float, copy=True)
+        chances.check_format(full_check=True)  # else what is out of range is read all the same
     else:
         array = np.asarray(transitions)
         if array.ndim == 2 and array.dtype.kind in "iu":
             chances = _certain(array)
-        elif array.ndim == 3 and array.shape[0] == array.shape[2]:
+        elif array.ndim == 3 and array.shape[0] == array.shape[2] and array.dtype.kind in "biuf":
             chances = scipy.sparse.csr_matrix(array.reshape(-1, array.shape[2]).astype(float))
         else:
             raise ValueError(
@@ -39,15 +45,28 @@ def as_transitions(transitions: ArrayLike | scipy.sparse.csr_matrix) -> scipy.sp
         raise ValueError(f"sparse transitions have the shape (S * A, S), not {chances.shape}")
     chances.sum_duplicates()
     chances.eliminate_zeros()
+    count = np.diff(chances.indptr)
+    owner = np.repeat(np.arange(len(count)), count)
+    if not np.all(fine := chances.data >= 0):  # nan is neither
+        wrong, k = chances.data, int(np.argmin(fine))
+        raise ValueError(f"{_move(owner[k], chances)} has the probability {wrong[k]:g}")
     total = np.asarray(chances.sum(axis=1)).ravel()
-    moves = np.diff(chances.indptr) > 0
-    if not (np.all(chances.data >= 0) and np.all(np.abs(total[moves] - 1) <= ROUNDING)):
-        worst = int(np.argmax(np.where(moves, np.abs(total - 1), 0)))
+    off = np.where(count > 0, np.abs(total - 1), 0)
+    if not np.all(off <= WRITTEN):
+        worst = int(np.argmax(off))
         raise ValueError(
-            "probabilities of transitions must not be negative, and those of a move add up to 1; "
-            f"row {worst} adds up to {total[worst]:g}"
+            f"probabilities of what follows {_move(worst, chances)} must add up to 1, not "
+            f"{total[worst]:.9g}; a state where it cannot be taken has zeros alone"
         )
+    if np.any(scaled := off > ROUNDING):
+        chances.data /= np.where(scaled, total, 1.0)[owner]
     return chances
+
+
+def _move(row: int, chances: scipy.sparse.csr_matrix) -> str:
+    """What a message calls the move of a row."""
+    state, action = divmod(int(row), chances.shape[0] // chances.shape[1])
+    return f"action {action} in state {state}"
 
 
 def _certain(successor: Ints) -> scipy.sparse.csr_matrix:
@@ -67,5 +86,6 @@ def in_range(numbers: Ints, count: int, what: str) -> Ints:
         ValueError: one that is negative, or as large as the count; `what` names them.
     """
     if numbers.size and not (numbers.min() >= 0 and numbers.max() < count):
-        raise ValueError(f"{what} must be from 0 to {count - 1}, not {numbers.tolist()}")
+        odd = numbers[(numbers < 0) | (numbers >= count)].ravel()[0]
+        raise ValueError(f"{what} must be from 0 to {count - 1}, not {odd}")
     return numbers

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
+from pydantic_core import PydanticCustomError
 
 from experiments.config.settings.kinds import (
     LIST,
@@ -26,7 +27,17 @@ from experiments.config.settings.kinds import (
 )
 from experiments.config.settings.study import RESULTS
 
-Name = PathWord  # of a state or an action; a number is a name too
+
+def _name(value: Any) -> Any:
+    """A name of a state, an action or a hypothesis, as text; a whole number is one too."""
+    text = str(value) if type(value) is int else value
+    if not isinstance(text, str) or not text.strip() or not text.isprintable():
+        words = f"{value!r:.60} is no name; write a word or a whole number"
+        raise PydanticCustomError("problem", "{words}", {"words": words})
+    return text
+
+
+Name = Annotated[str, BeforeValidator(_name)]
 Names = tuple[Name, ...]
 Discount = Annotated[float, Field(gt=0, le=1), BeforeValidator(read_number)]
 Start = Annotated[
@@ -56,7 +67,7 @@ class WorldHypothesesSettings:
 class WorldSettings:
     """The file of a world."""
 
-    moves: PathWord
+    moves: Annotated[PathWord, Field(min_length=1)]
     start: Start
     goals: one_or_list(Name, Names) = ()  # type: ignore[valid-type]
     states: one_or_list(Count, Names) = ()  # type: ignore[valid-type]

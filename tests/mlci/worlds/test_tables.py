@@ -93,8 +93,8 @@ def test_a_path_follows_its_actions_and_belongs_to_what_it_meets() -> None:
     [
         ([0, 2], [1], r"path 'walk', step 0: the table has no move by action 1 from state 0 to 2"),
         ([0, 1, 2, 1], [1, 1, 0], r"step 2: the table has no move by action 0 from state 2 to 1"),
-        ([0, 3], [1], r"states of path 'walk' must be from 0 to 2, not \[0, 3\]"),
-        ([0, 1], [2], r"actions of path 'walk' must be from 0 to 1, not \[2\]"),
+        ([0, 3], [1], r"states of path 'walk' must be from 0 to 2, not 3"),
+        ([0, 1], [2], r"actions of path 'walk' must be from 0 to 1, not 2"),
     ],
     ids=["other end", "beyond the goal", "no state", "no action"],
 )
@@ -115,20 +115,40 @@ def test_an_action_that_may_not_be_taken_leads_along_no_path() -> None:
         line().path(0, [1, 1, 1])
 
 
+def out_of_range() -> sparse.csr_matrix:
+    """A damaged array: one of its indices is beyond its shape."""
+    array = sparse.csr_matrix(np.eye(3))
+    array.indices[0] = 77
+    return array
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"transitions": [[0.5]]}, "transitions are whole numbers"),
         ({"transitions": sparse.csr_matrix((5, 3))}, r"shape \(S \* A, S\), not \(5, 3\)"),
-        ({"transitions": [[1], [2]]}, r"successors must be from 0 to 1, not \[1, 2\]"),
-        ({"transitions": np.full((2, 1, 2), 0.6)}, "row 0 adds up to 1.2"),
-        ({"transitions": np.full((2, 1, 2), np.nan)}, "row 0 adds up to nan"),
-        ({"transitions": np.array([[[1.5, -0.5]], [[1, 0]]])}, "must not be negative"),
-        ({"reward": np.nan}, "rewards of moves must be finite"),
-        ({"start": 3}, r"the start must be from 0 to 2, not \[3\]"),
+        ({"transitions": [[1], [2]]}, "successors must be from 0 to 1, not 2"),
+        (
+            {"transitions": np.full((2, 1, 2), 0.6)},
+            "action 0 in state 0 must add up to 1, not 1.2; a state",
+        ),
+        (
+            {"transitions": np.full((2, 1, 2), np.nan)},
+            "action 0 in state 0 has the probability nan",
+        ),
+        (
+            {"transitions": np.array([[[1.5, -0.5]], [[1, 0]]])},
+            "action 0 in state 0 has the probability -0.5",
+        ),
+        ({"transitions": np.zeros((2, 1, 2), complex)}, "transitions are whole numbers"),
+        ({"transitions": sparse.csr_matrix(np.eye(2) * 1j)}, "real numbers, not complex128"),
+        ({"transitions": out_of_range()}, "indices must be < 3"),
+        ({"reward": np.nan}, "must lie within 1e.09 nat, .* one is nan"),
+        ({"reward": -1e300}, "must lie within 1e.09 nat, .* one is -1e.300"),
+        ({"start": 3}, "the start must be from 0 to 2, not 3"),
         ({"start": [0.5, 0.4, 0.0]}, r"probabilities that add up to 1, not .* up to 0.9"),
         ({"start": [1.0, 0.0]}, r"or \(3,\) probabilities"),
-        ({"goals": [0, -1]}, r"goals must be from 0 to 2, not \[0, -1\]"),
+        ({"goals": [0, -1]}, "goals must be from 0 to 2, not -1"),
         ({"regions": {"x": TableRegion(states=[3])}}, "states of a region must be from 0 to 2"),
         ({"regions": {"x": TableRegion(actions=[2])}}, "actions of a region must be from 0 to 1"),
         ({"regions": {"x": TableRegion(moves=[(0, 2)])}}, "actions of a region must be from 0"),
@@ -139,6 +159,15 @@ def test_what_is_no_table_is_refused(changes: dict[str, Any], message: str) -> N
     arguments = {"transitions": LINE, "reward": -1.0, "start": 0, "goals": 2, **changes}
     with pytest.raises(ValueError, match=message):
         Table.from_arrays(**arguments)
+
+
+def test_probabilities_in_few_digits_are_scaled() -> None:
+    thirds = np.full((3, 1, 3), 1 / 3, dtype=np.float32)
+    table = Table.from_arrays(thirds, -1.0, [0.3333333, 0.3333333, 0.3333333])
+    np.testing.assert_allclose(table.transitions.sum(axis=1), 1, rtol=0, atol=1e-15)
+    assert table.start.sum() == pytest.approx(1, abs=1e-15)
+    exact = Table.from_arrays(np.array([[[0.1, 0.9]], [[0.7, 0.3]]]), -1.0, 0)
+    assert exact.transitions.data.tolist() == [0.1, 0.9, 0.7, 0.3]
 
 
 def test_a_world_of_chance_has_no_successors() -> None:
