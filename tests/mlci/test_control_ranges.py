@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from mlci.control_inference import control_avoidance, infer_controls, without
 from mlci.control_ranges import ControlRanges
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
-from mlci.evidence import Rates
+from mlci.evidence import DEFAULT_MODEL_ERROR, Rates
 from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.simulate import rollout
@@ -166,6 +167,33 @@ def test_posterior_is_that_of_equation_5() -> None:
     likelihood = np.where(inference.applied[0], 0.0, 1 / inference.avoidance[0])
     weight = np.append(0.1 * likelihood, 0.4)
     np.testing.assert_allclose(inference.ranking.posterior, (weight / weight.sum())[:-1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("exact_ends", [False, True])
+def test_options_reach_the_probabilities_and_the_evidence(exact_ends: bool) -> None:
+    """A horizon of 1.68 s is rounded to 3 steps; the model error is the library's own."""
+    path = cart_path([0.6 * LIMIT, 0.2 * LIMIT, -0.4 * LIMIT, 0.0], hold=42)
+    regions, actions = Regions.from_boxes(CART.space, []), action_grid(CART, 9)
+    model = discretize(CART, Grid(CART.space, (24, 16)), actions, 0.5, regions)
+    with pytest.raises(ValueError, match="horizon"):
+        infer_controls(model, [path], RANGES, exact_ends=exact_ends)
+    inference = infer_controls(
+        model, [path], RANGES, tolerance=0.2 * LIMIT, exact_ends=exact_ends, round_horizon=True
+    )
+    three = replace(path.task, horizon=1.5)
+    alpha, other = (
+        control_avoidance(model, [three], RANGES.holds(actions), exact_ends=ends)
+        for ends in (exact_ends, not exact_ends)
+    )
+    np.testing.assert_allclose(inference.avoidance, alpha, atol=1e-12)
+    assert np.max(np.abs(alpha - other)) > 0.01
+    # 0.6 is deep enough in what is above 0.25 alone, -0.4 in none of what is below.
+    assert inference.applied.tolist() == [[True, False, False, False, False, False]]
+    eta = DEFAULT_MODEL_ERROR
+    gain = np.where(inference.applied[0], -np.inf, -np.log((1 - eta) * alpha[0] + eta))
+    np.testing.assert_allclose(inference.ranking.gain, gain, atol=1e-12)
+    broken = infer_controls(model, [path], RANGES, rates=Rates(0.0, 0.2), round_horizon=True)
+    assert broken.ranking.gain[0] == pytest.approx(np.log(0.2))
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,9 @@ from scipy.stats import entropy as entropy_of
 from toy_models import toy_model
 
 import mlci
-from mlci.demonstrations import Task
+from mlci.demonstrations import Demonstration, Task
 from mlci.evidence import PAPER, Rates
+from mlci.forecasts import ForecastCurve, ForecastMap
 from mlci.inference import Inference
 from mlci.next_task import NextTask, entropy, nearly_the_same, next_tasks, plausible, simulate_tasks
 from mlci.regions import Regions
@@ -42,12 +43,13 @@ def task_to(goal: int) -> Task:
     return Task(np.array([0.5]), Box.point([goal + 0.5]), float(STEPS))
 
 
-def nothing_seen(model: TabularModel, rates: Rates = PAPER) -> Inference:
-    """The inference from no demonstration."""
-    none, count = np.zeros((0, len(model.regions))), 0
-    return Inference(
-        model.regions, (), none, none.astype(bool), np.zeros(count, dtype=bool), rates=rates
-    )
+def nothing_seen(
+    model: TabularModel, rates: Rates = PAPER, hypotheses: Bools | None = None
+) -> Inference:
+    """The inference from no demonstration, about all regions or some."""
+    regions = model.regions if hypotheses is None else model.regions.select(hypotheses)
+    none, count = np.zeros((0, len(regions))), 0
+    return Inference(regions, (), none, none.astype(bool), np.zeros(count, dtype=bool), rates=rates)
 
 
 def every_trajectory(model: TabularModel, goal: int) -> tuple[Bools, Floats]:
@@ -123,6 +125,77 @@ def test_the_first_task_is_the_most_informative_by_enumeration() -> None:
     assert first.number == best
     assert first.information == pytest.approx(exact[best], abs=4 * first.error)
     assert first.information <= entropy(belief)
+
+
+def information_about_one(alpha: float, prior_none: float) -> float:
+    """Of one region, whose demonstrators avoid it, if it is forbidden, and with alpha if not."""
+    avoids = 1 - prior_none + prior_none * alpha
+    told = entropy_of([avoids, 1 - avoids])
+    return float(told - prior_none * entropy_of([alpha, 1 - alpha]))
+
+
+def swing_world() -> tuple[TabularModel, Task, Bools]:
+    """A coarse pendulum, a task that its time step does not divide, and one region to ask of."""
+    system = mlci.Pendulum()
+    regions = mlci.Regions.from_grid(system.space, (5, 5))
+    grid, actions = mlci.Grid(system.space, (9, 9)), mlci.action_grid(system, 5)
+    model = mlci.discretize(system, grid, actions, 0.5, regions)
+    task = Task(np.array([0.65, 0.0]), Box([2.8, -0.3], [3.2, 0.3]), 3.2)
+    return model, task, np.arange(25) == 7
+
+
+@pytest.mark.parametrize("exact_ends", [False, True])
+@pytest.mark.parametrize("calibrated", [False, True])
+def test_alpha_is_that_of_the_inference_by_the_same_options(
+    exact_ends: bool, calibrated: bool
+) -> None:
+    """Ends, a rounded horizon, the hypotheses and a calibration, by closed form."""
+    model, task, mask = swing_world()
+    level = ForecastMap((ForecastCurve((1e-6, 1.0), 9, 99, 0.0, 0.0, 0.0, ceiling=0.6),))
+    options = {"exact_ends": exact_ends, "round_horizon": True, "hypotheses": mask}
+    path = Demonstration.from_path([task.start, [3.0, 0.0]], task.horizon)
+    of_path = mlci.infer(model, [replace(path, task=task)], rates=PAPER, **options)
+    alpha = of_path.avoidance[0, 0]
+    inference = nothing_seen(model, hypotheses=mask)
+    if calibrated:  # 0.7 whatever alpha is
+        inference, alpha = replace(inference, calibration=level), 1 - 0.6 / 2
+    first = next_tasks(model, inference, [task], samples=4000, **options)[0]
+    expected = information_about_one(alpha, inference.posterior_none)
+    assert first.information == pytest.approx(expected, abs=4 * first.error)
+    assert first.error < 0.1 * expected
+    with pytest.raises(ValueError, match="horizon"):
+        next_tasks(model, inference, [task], hypotheses=mask)
+
+
+def test_what_one_task_reveals_is_not_expected_of_the_next() -> None:
+    """All trajectories of both tasks cross the one region: a demonstration tells everything."""
+    successor, every = np.array([[1], [2], [3], [0]]), np.ones((4, 1), dtype=bool)
+    model = away(toy_model(successor, np.zeros((4, 1)), every, every))
+    tasks = [Task(np.array([at]), Box.point([at + 1]), 1.0) for at in (0.5, 2.5)]
+    first, second = next_tasks(model, nothing_seen(model), tasks, exact_ends=False)
+    assert first.information == pytest.approx(np.log(2))
+    assert second.information == pytest.approx(0, abs=1e-12)
+
+
+def test_each_task_has_trajectories_of_its_own_by_the_seed() -> None:
+    """The same task again is drawn anew, and a task more changes none before it."""
+    model = toy_world()
+    task, inference = task_to(2), nothing_seen(model)
+
+    done: list[tuple[int, int]] = []
+
+    def drawn(count: int, seed: int) -> list[Floats]:
+        options = {"samples": 300, "seed": seed, "exact_ends": False}
+        simulated = simulate_tasks(
+            model, inference, [task] * count, progress=lambda *some: done.append(some), **options
+        )
+        return [outcomes.likelihood for outcomes in simulated]
+
+    first, again = drawn(2, seed=0)
+    assert done == [(1, 2), (2, 2)]
+    assert not np.array_equal(first, again)
+    assert not np.array_equal(first, drawn(1, seed=1)[0])
+    assert np.array_equal(first, drawn(1, seed=0)[0])
 
 
 def test_a_batch_repeats_no_task_and_adds_less_with_each() -> None:

@@ -142,6 +142,15 @@ def test_information_of_two_demonstrations_is_that_of_one_and_then_of_the_other(
     assert outcomes.information(BELIEF) + second == pytest.approx(both, abs=1e-12)
 
 
+@pytest.mark.parametrize(("likely", "chance"), [(0.57, 0), (0.62, 1)])
+def test_a_demonstration_reveals_something_from_a_tenth_of_the_belief_on(
+    likely: float, chance: float
+) -> None:
+    """Of two equal beliefs, either outcome moves `likely` - 1 / 2 from one to the other."""
+    outcomes = TaskOutcomes(np.array([[likely, 1 - likely], [1 - likely, likely]]), 10)
+    assert outcomes.chance(np.array([0.5, 0.5])) == pytest.approx(chance)
+
+
 def test_columns_that_do_not_add_up_are_refused() -> None:
     with pytest.raises(ValueError, match="add up to 1 in each column"):
         TaskOutcomes(np.full((3, 2), 0.5), 10)

@@ -8,14 +8,21 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import rankdata
 from tiny_point import composed, hopeless
 
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
+from experiments.point.inference import infer_point
 from experiments.point.run import run_point
+from experiments.point.streams import Purpose, stream
 from experiments.point.tables import FIRST, PAPER_SIZE, opening_columns, table_bytes
 from experiments.tracking.store import Store
 from experiments.tracking.tables import rounded
+from mlci.baselines import BASELINES
+from mlci.evidence import PAPER
+from mlci.metrics import random_subsets
+from mlci.preparation import infer
 
 WORDS = ["truth=wall", "horizon=4.0", "dt=0.5", "actions=3", "grid.shape=[16,8]"]
 WORDS += ["safety.shape=[41,21]", "demonstrations.pairs=14", "demonstrations.keep=11"]
@@ -25,9 +32,14 @@ WORDS += ["ranks.top=4", "rollouts=2", "baselines.paths=5"]
 
 
 @pytest.fixture(scope="module")
-def point(tmp_path_factory: pytest.TempPathFactory) -> tuple[Settings, dict, list[str]]:
+def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    return Store(tmp_path_factory.mktemp("store"))
+
+
+@pytest.fixture(scope="module")
+def point(store: Store) -> tuple[Settings, dict, list[str]]:
     settings, lines = read_config(composed(*WORDS))[0], []
-    tables = run_point(settings, Store(tmp_path_factory.mktemp("store")), lines.append)
+    tables = run_point(settings, store, lines.append)
     return settings, tables, lines
 
 
@@ -67,6 +79,35 @@ def test_baselines_are_ranked_on_the_subsets_of_ranks(point: tuple) -> None:
         assert len(one) == 6
     assert (rows.loc[rows["method"] == "uniform", "first"] == 0).all()
     assert rows["log_rank"].between(0, np.log(rows["rank"]) + 1e-12).all()
+
+
+def test_baselines_are_ranked_by_the_library_on_each_subset_alone(
+    point: tuple, store: Store
+) -> None:
+    """Those that draw nothing, and the paper's evidence, which goes from cell to cell."""
+    settings, tables, _ = point
+    asked = infer_point(settings, store)
+    truth = asked.inference.hypotheses.inside(settings.constraint)
+    table = tables["baselines"].set_index(["method", "demonstrations"])
+
+    def scores(method: str, subset: np.ndarray) -> np.ndarray:
+        some = [asked.demonstrations[j] for j in subset]
+        if method == "paper":
+            options = {"hypotheses": asked.hypotheses, "exact_ends": False, "rates": PAPER}
+            return infer(asked.model, some, tolerance=np.inf, **options).gain
+        score = BASELINES[method].score(asked.model, some, 0, np.random.default_rng(0))
+        return score[asked.hypotheses]
+
+    for size in (1, 3, 9):
+        rng = stream(settings.seed, Purpose.SUBSETS, 0)
+        subsets = random_subsets(len(asked.demonstrations), 9, 6, rng)[size - 1]
+        for method in ("paper", "visits", "nearest", "uniform"):
+            ordered = [rankdata(-scores(method, subset).round(9)) for subset in subsets]
+            rank = np.array([each[truth].min() for each in ordered])
+            expected = {"rank": rank.mean(), "log_rank": np.log(rank).mean()}
+            expected |= {"top": (rank <= 4).mean(), "first": (rank == 1).mean()}
+            assert table.loc[(method, size)].to_dict() == pytest.approx(expected), (method, size)
+    assert table.groupby("demonstrations")["rank"].nunique().max() > 3  # methods can be told apart
 
 
 def test_first_are_the_first_five_and_probabilities_those_of_one_trial(point: tuple) -> None:
