@@ -57,20 +57,30 @@ def draw(soft: pd.DataFrame) -> Figure:
     truths = sorted(rows["truth"].unique())
     figure, grid = new_figure(PAGE, 2.5, ncols=len(truths) + 1, squeeze=False)
     with plt.rc_context(RC):
+        sizes, legend = sorted(rows["demonstrations"].unique()), {}
         for axes, truth in zip(grid[0], truths, strict=False):
-            _estimates(axes, rows[rows["truth"] == truth])
+            _estimates(axes, rows[rows["truth"] == truth], sizes)
             axes.set_title(str(truth).upper())
+            handles, labels = axes.get_legend_handles_labels()
+            legend |= dict(zip(labels, handles, strict=True))
         _coverage(grid[0][-1], rows)
-        handles, labels = grid[0][0].get_legend_handles_labels()
+        labels = [label for size in sizes if (label := _label(size)) in legend]
+        handles = [legend[label] for label in labels]
         figure.legend(handles, labels, loc="outside lower center", ncols=len(handles))
     return figure
 
 
-def _estimates(axes: plt.Axes, rows: pd.DataFrame) -> None:
+def _label(size: int) -> str:
+    """What the legend says of a number of demonstrations."""
+    return f"{size} demonstrations"
+
+
+def _estimates(axes: plt.Axes, rows: pd.DataFrame, sizes: list[int]) -> None:
     """The quartiles of estimates against true weights, a mark a number of demonstrations."""
     line = [_LEAST, _WALL]
     axes.plot(line, line, color=GUIDE, linewidth=0.6, linestyle=":", zorder=0)
-    for number, (size, some) in enumerate(rows.groupby("demonstrations")):
+    for size, some in rows.groupby("demonstrations"):
+        number = sizes.index(size)
         x = np.maximum(some["weight"], _LEAST) * _ASIDE ** (2 * number - 1)
         low, median, high = (_drawn(some[name]) for name in ("low", "median", "high"))
         axes.errorbar(
@@ -80,7 +90,7 @@ def _estimates(axes: plt.Axes, rows: pd.DataFrame) -> None:
             color=STEP_COLOURS[number],
             marker=STEP_MARKS[number],
             linestyle="none",
-            label=f"{size} demonstrations",
+            label=_label(size),
         )
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -89,7 +99,7 @@ def _estimates(axes: plt.Axes, rows: pd.DataFrame) -> None:
     axes.set_xticks(ticks[:-1], names[:-1])
     axes.minorticks_off()
     axes.set_ylim(_LEAST * 0.7, _WALL * 1.4)
-    axes.set_xlim(_LEAST * 0.7, 40)
+    axes.set_xlim(_LEAST * 0.5, 40)
     axes.set_xlabel("true weight [nat/s]")
     axes.set_ylabel("estimate, quartiles [nat/s]")
 
@@ -114,7 +124,7 @@ def _coverage(axes: plt.Axes, rows: pd.DataFrame) -> None:
     axes.set_xscale("log")
     axes.set_xticks([_LEAST, 1, 10], ["0", "1", "10"])
     axes.minorticks_off()
-    axes.set_xlim(_LEAST * 0.7, 40)
+    axes.set_xlim(_LEAST * 0.5, 40)
     axes.set_ylim(min(80.0, 100 * rows["covers_low"].min() - 2), 101)
     axes.set_title("interval holds the truth")
     axes.set_xlabel("true weight [nat/s]")
