@@ -90,9 +90,12 @@ class TrajectoryDistribution:
             exact_ends: begin and end at states, not at cells.
 
         Raises:
+            TypeError: a model without cells.
             ValueError: a start outside the state space, or a horizon that dt does not divide (to a
                 thousandth of a step, as recorded times are rounded).
         """
+        if not hasattr(model, "grid"):
+            raise TypeError(f"this needs a TabularModel; a {type(model).__name__} has no cells")
         start = int(model.grid.index(task.start))
         if start < 0:
             raise ValueError(f"the start {task.start} lies outside the state space")

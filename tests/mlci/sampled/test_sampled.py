@@ -169,3 +169,8 @@ def test_a_model_and_tasks_that_cannot_be_are_refused():
     with pytest.raises(ValueError, match="does not divide the horizon"):
         MODEL.distribution(replace(TASK, horizon=5.1))
     assert MODEL.passage(replace(TASK, horizon=5.1), round_horizon=True).steps == 20
+
+
+def test_what_needs_cells_says_so_of_a_model_without_them():
+    with pytest.raises(TypeError, match="needs a TabularModel; a SampledModel has no cells"):
+        TrajectoryDistribution.of_task(MODEL, TASK)
