@@ -216,11 +216,14 @@ class Archive:
         return [self.point(identity) for identity in study.points]
 
     def find(self, name: str) -> Study | Facts:
-        """A study by its name, or a point by its identity or the beginning of it.
+        """A study by its name, or a point by its identity, the beginning of it, or its folder.
 
         Raises:
             ArchiveError: there is none, or several.
         """
+        folder = Path(name).absolute()
+        if folder.parent == (self.results / "points").absolute():  # as `run.py` prints it
+            name = folder.name
         listing = self._listings.get(name)
         if isinstance(listing, StudyError):
             raise ArchiveError(str(listing))
@@ -238,7 +241,7 @@ class Archive:
             raise ArchiveError(
                 f"{self.results} holds no results; run a sweep first, or give --results"
             )
-        raise ArchiveError(f"{name}: no such study or point{did_you_mean(name, self._listings)}")
+        raise ArchiveError(f"{name}: no such study or point{self._known(name)}")
 
     def study(self, name: str) -> Study:
         """A study by its name.
@@ -248,8 +251,14 @@ class Archive:
         """
         study = self._listings.get(name) or self.find(name)
         if not isinstance(study, Study):
-            raise ArchiveError(f"{name}: no such study{did_you_mean(name, self._listings)}")
+            raise ArchiveError(f"{name}: no such study{self._known(name)}")
         return study
+
+    def _known(self, name: str) -> str:
+        """The end of a message about an unknown name."""
+        if not self._listings:
+            return f" in {self.results}, which holds no study"
+        return did_you_mean(name, self._listings)
 
 
 def _inner_folders(folder: Path) -> tuple[list[Path], list[str]]:

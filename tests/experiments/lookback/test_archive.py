@@ -54,6 +54,11 @@ def test_a_name_that_fits_several_or_nothing_is_refused(
         archive.find("soem")
     with pytest.raises(ArchiveError, match=f"{points[0].identity}: no such study; known are some"):
         archive.study(points[0].identity)
+    assert archive.find(str(tmp_path / "points" / points[0].identity)) is archive.find(
+        points[0].identity
+    )
+    with pytest.raises(ArchiveError, match="other/points/abc: no such study or point"):
+        archive.find("other/points/abc")
 
 
 def test_an_empty_folder_is_told(tmp_path: Path) -> None:
