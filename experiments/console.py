@@ -85,7 +85,7 @@ def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) 
     if answer.ties is not None and len(answer.ties.others):
         yield from entry("ties", answer.ties.summary(names))
     for estimate in answer.weights:
-        yield from entry("soft or hard?", f"region {estimate.region} {estimate}")
+        yield from entry("soft or hard?", f"region {estimate.region}, {estimate}")
     yield from _next_lines(answer)
     for warning in answer.warnings:
         yield from entry("warning", warning)
@@ -98,10 +98,10 @@ def set_lines(sets: SetPosterior | None, names: Sequence[str]) -> Iterator[str]:
     best, marginal = sets.most_probable(), sets.marginal
     first = np.argsort(-marginal, kind="stable")[:_MARGINALS]
     likely = ", ".join(f"{names[i]} {probability(marginal[i])}" for i in first)
-    members = f"of {listed([names[i] for i in best])}" if best else "that forbids nothing"
+    members = f"is that of {listed([names[i] for i in best])}" if best else "forbids nothing"
     yield from entry(
         "sets",
-        f"the most probable set is that {members}, with probability "
+        f"the most probable set {members}, with probability "
         f"{probability(sets.probability_of(best))}; forbidden, alone or with others: {likely}",
     )
     if sets.check is not None:
@@ -131,8 +131,8 @@ def _next_lines(answer: Answer) -> Iterator[str]:
     for each in answer.next_tasks:
         yield from entry(
             title,
-            f"{each.name}: {task_words(each.task, space)}: {each.information:.3f} nat expected, "
-            f"tells something with probability {probability(each.chance)}",
+            f"task {each.name}: {task_words(each.task, space)}: {each.information:.3f} nat "
+            f"expected, tells something with probability {probability(each.chance)}",
             hang=2,
         )
         title = ""
@@ -168,14 +168,18 @@ def _ranking_lines(inference: Inference, top: int, truth: Container[int]) -> Ite
             [[*fact, *side, *mark] for fact, side, mark in zip(facts, sides, marks, strict=True)]
         )
     )
+    shaped = [hypotheses.names[i] for i in first if not hypotheses.are_boxes[i]]
+    note = entry("", f"no boxes, but shapes within the bounds above: {listed(shaped)}")
     if max(map(len, lines)) + 2 <= WIDTH:
         yield from (f"  {line}" for line in lines)
+        yield from note if shaped else ()
         return
     few = [fact + mark for fact, mark in zip(facts, marks, strict=True)]
     for i, line in zip([None, None, *first], table_lines(few), strict=True):
         yield f"  {line}"
         if i is not None:
             yield from entry("", bounds(hypotheses.box(i), space))
+    yield from note if shaped else ()
 
 
 def _carrier_words(answer: Answer) -> str:
@@ -200,12 +204,12 @@ def _left_out_words(answer: Answer) -> str:
     if support.stays.all():
         return f"{name} stays first whichever demonstration is left out"
     others = [
-        f"without {inference.names[j]} {inference.hypotheses.names[support.first_without[j]]}"
+        f"{inference.hypotheses.names[support.first_without[j]]} without {inference.names[j]}"
         for j in np.flatnonzero(~support.stays)
     ]
     return (
         f"{name} stays first when any but {len(others)} of {len(support.stays)} demonstrations is "
-        f"left out; first is {listed(others, _CARRIERS)}"
+        f"left out; what comes first then: {listed(others, _CARRIERS)}"
     )
 
 

@@ -98,8 +98,8 @@ def infer(settings: RecordedSettings) -> int:
     for line in together(notes):
         complain(f"note: {line}")
     if not demonstrations:
-        lacking = f": {len(problems)} lack what is named above" if problems else ""
-        print(f"no demonstration could be used{lacking}")
+        why = "; the lines above say why" if problems else ""
+        print(f"no demonstration could be used{why}")
         return FAILED
     results = writable_results(settings)
     checks = plausibilities(settings, demonstrations)

@@ -58,6 +58,8 @@ class Crossing:
         return self.depth == self.time == 0
 
     def __str__(self) -> str:
+        if not (self.depth or self.time):
+            return "every crossing of a region counts"
         return (
             f"a crossing counts from {self.depth:g} of a region's width and {self.time:g} s inside"
         )

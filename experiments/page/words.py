@@ -25,8 +25,9 @@ def of_100(probability: float) -> str:
 
 
 def where(regions: Regions, number: int) -> str:
-    """The bounds of a region with their units."""
-    return bounds(regions.box(number), regions.space)
+    """The bounds of a region with their units; of another shape those that it lies within."""
+    within = "" if regions.are_boxes[number] else "within "
+    return f"{within}{bounds(regions.box(number), regions.space)}"
 
 
 def answer_sentences(answer: Answer) -> list[str]:

@@ -81,9 +81,9 @@ class WeightEstimate:
 
     def __str__(self) -> str:
         return (
-            f"{self.verdict}: weight {self.weight:.3g} ({self.lower:.3g} to {self.upper:.3g}) "
-            f"nat/s, wall against it {self.hard_to_soft:.3g} nat; inside for "
-            f"{self.time_inside:.3g} s, {self.expected_time:.3g} s expected"
+            f"{self.verdict}: weight {self.weight:.3g} nat/s (95 %: {self.lower:.3g} to "
+            f"{self.upper:.3g}); a wall is {abs(self.hard_to_soft):.3g} nat less likely; inside "
+            f"for {self.time_inside:.3g} s, {self.expected_time:.3g} s without a constraint"
         )
 
     def record(self) -> dict[str, Any]:

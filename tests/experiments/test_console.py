@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.console import answer_lines, bounds, probability
+from experiments.page.words import where
 from experiments.terminal import entry
 from mlci.answers import Answer
 from mlci.demonstrations import Task
@@ -17,6 +18,7 @@ from mlci.inference import Inference
 from mlci.misfit import Misfit
 from mlci.next_task import NextTask
 from mlci.regions import Regions
+from mlci.shapes.balls import Ball
 from mlci.spaces import Box, StateSpace
 from mlci.support import support
 
@@ -74,8 +76,7 @@ def test_the_answer_word_by_word() -> None:
         "                0.974 in 0: angle 0 to 1 rad, angular velocity -6 to 0 rad/s",
         "assumed         at most one region is forbidden; prior of none 0.5, the rest",
         "                shared equally; model error 0; rule breaking 0; temperature 1;",
-        "                paths begin and end at states; a crossing counts from 0 of a",
-        "                region's width and 0 s inside",
+        "                paths begin and end at states; every crossing of a region counts",
         "rests on        2 of 3 demonstrations, which bring half of the gain of 0:",
         "                demonstration_of_the_0th_person 46 %,",
         "                demonstration_of_the_1th_person 46 %",
@@ -92,8 +93,8 @@ def test_what_is_printed_where_there_is_little_to_say() -> None:
     assert "95 % credible no constraint and 11 regions in 1 area:" in text
     text = said(answer(PLANE, (6, 2), [[0.01, 1.0], [1.0, 0.1]]))
     assert (
-        "0 stays first when any but 1 of 2 demonstrations is left out; first is without "
-        "demonstration_of_the_0th_person 1"
+        "0 stays first when any but 1 of 2 demonstrations is left out; what comes first then: "
+        "1 without demonstration_of_the_0th_person"
     ) in text
     apart = np.where(np.isin(np.arange(25), [0, 2, 10, 12, 20]), 1e-4, 1.0).tolist()
     text = said(answer(BODY, (None, 5, 5, None), [apart]))
@@ -123,9 +124,21 @@ def test_what_to_record_next_is_printed_with_units() -> None:
     told = replace(answer(PLANE, (2, 2), [[0.5]]), next_tasks=(chosen,))
     words = " ".join(" ".join(answer_lines(told, 3)).split())
     assert (
-        "record next reach: from angle 0.5 rad, angular velocity 0 rad/s to angle 3 to 3.5 rad in "
-        "5 s: 0.210 nat expected, tells something with probability 0.340 as far as at most one"
+        "record next task reach: from angle 0.5 rad, angular velocity 0 rad/s to angle 3 to 3.5 "
+        "rad in 5 s: 0.210 nat expected, tells something with probability 0.340 as far as at "
+        "most one"
     ) in words
+
+
+def test_regions_that_are_no_boxes_are_told_to_lie_within_their_bounds() -> None:
+    boxes = answer(PLANE, (2, 1), [[0.5, 0.9]])
+    shapes = [Ball([2.0, 0.0], [0.5, 1.0]), Box([0.0, -6.0], [1.0, 0.0])]
+    regions = Regions.from_shapes(PLANE, shapes)
+    shaped = replace(boxes, inference=replace(boxes.inference, hypotheses=regions))
+    lines = list(answer_lines(shaped, 2))
+    assert "                no boxes, but shapes within the bounds above: 0" in lines
+    assert where(regions, 0) == "within angle 1.5 to 2.5 rad, angular velocity -1 to 1 rad/s"
+    assert where(regions, 1) == "angle 0 to 1 rad, angular velocity -6 to 0 rad/s"
 
 
 def test_a_box_in_words() -> None:

@@ -248,7 +248,7 @@ def test_where_no_demonstration_can_be_used_each_file_is_told(
         (tmp_path / "a.csv").write_text(content)
     done = infer(tmp_path, "demonstrations=a.csv")
     assert done.returncode == 1
-    assert "no demonstration could be used: 1 lack what is named above" in done.stdout
+    assert "no demonstration could be used; the lines above say why" in done.stdout
     lacks = "there is no such file" if content is None else "has no column angular_velocity"
     assert f"not used: a.csv: {lacks}" in done.stderr
     assert "Traceback" not in done.stderr
