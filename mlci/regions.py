@@ -83,6 +83,8 @@ class Regions:
         Raises:
             ValueError: a shape that cannot be one of this space, or lies outside its bounds.
         """
+        if isinstance(shapes, Shape | Box):
+            raise ValueError(f"regions are a list of shapes, not one {type(shapes).__name__}")
         parts = [as_shape(shape) for shape in shapes]
         hulls = [checked_hull(space, part, f"region {k}") for k, part in enumerate(parts)]
         corners = np.array([(hull.lower, hull.upper) for hull in hulls])

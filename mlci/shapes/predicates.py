@@ -91,13 +91,15 @@ class Predicate(_Searched):
             raw units; None if that is not known. A safe set needs it.
 
     Raises:
-        ValueError: a steepness that is not positive.
+        ValueError: no function, or a steepness that is not positive.
     """
 
     function: StateFunction
     steepness: float | None = None
 
     def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise ValueError(f"a predicate needs a function of states, not {self.function!r}")
         _check_steepness(self.steepness)
 
     @property

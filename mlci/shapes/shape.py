@@ -200,7 +200,15 @@ class Intersection(Union):
 
 
 def as_shape(part: Shape | Box) -> Shape:
-    """A box as a shape; shapes as they are."""
+    """A box as a shape; shapes as they are.
+
+    Raises:
+        ValueError: neither.
+    """
+    if not isinstance(part, Shape | Box):
+        raise ValueError(
+            f"a region is a Box, or a shape such as a Ball or a Predicate, not {part!r:.80}"
+        )
     return Cuboid(part) if isinstance(part, Box) else part
 
 
@@ -216,7 +224,11 @@ def checked_hull(space: StateSpace, part: Shape, name: str) -> Box:
         hull = part.hull(space)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
-    if not np.all(hull.lower < hull.upper):
+    except Exception as error:  # it may be anybody's function
+        raise ValueError(f"{name} fails: {type(error).__name__}: {error}") from error
+    bounds, ends = space.bounds, ~space.periodic
+    meets = (hull.lower < bounds.upper) & (hull.upper > bounds.lower)
+    if not np.all(hull.lower < hull.upper) or not np.all(meets[ends]):
         raise ValueError(f"{name} holds nothing of the bounds of the state space")
     return hull
 

@@ -253,6 +253,7 @@ VALUES = [
     ("truth.balls=[{center:[0,1],radii:[1,0]}]", "truth.balls[0].radii[1]: 0.0 must be above 0"),
     ("truth.balls=[{center:[0,1],radii:[null,null]}]", "truth.balls[0]: a ball needs positive"),
     ("truth.balls=[{center:[0,1],radius:1}]", "truth.balls[0].radius: unknown key"),
+    ("truth.balls=[{center:[0,99],radii:[1,1]}]", "truth.balls[0] holds nothing of the bounds"),
     ("truth.half_spaces=[1]", "truth.half_spaces[0]: 1 is not a half-space; write {normal"),
     ("truth.half_spaces=[{normal:[1,0],offset:1}]", "truth.half_spaces[0]: angle wraps"),
     ("truth.half_spaces=[{normal:[0,1],offset:7}]", "truth.half_spaces[0] holds nothing of"),

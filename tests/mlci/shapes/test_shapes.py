@@ -300,6 +300,10 @@ def test_shapes_that_are_none(make, message):
         (PLANE, HalfSpace([1], 0), "region 0: a half-space needs a normal of 2 dimensions"),
         (CYLINDER, HalfSpace([1, 0], 0), "region 0: angle wraps"),
         (PLANE, HalfSpace([1, 0], 3), "region 0 holds nothing of the bounds"),
+        (PLANE, Ball([0, 100], [1, 1]), "region 0 holds nothing of the bounds"),
+        (PLANE, Box([0, 90], [1, 91]), "region 0 holds nothing of the bounds"),
+        (PLANE, "ball", "a region is a Box, or a shape such as a Ball or a Predicate, not 'ball'"),
+        (PLANE, Predicate(lambda x: x[..., 7]), "region 0 fails: IndexError: index 7 is out"),
         (PLANE, Box([0], [1]) | ELLIPSE, "a box in 2 dimensions, not 1"),
         (PLANE, Box([0, 0], [0, 1]) | ELLIPSE, "lower < upper"),
         (PLANE, Predicate(lambda x: x), "a truth value or a level a state"),
@@ -316,6 +320,13 @@ def test_shapes_that_are_none(make, message):
 def test_shapes_that_a_space_cannot_hold(space, shape, message):
     with pytest.raises(ValueError, match=message):
         Regions.from_shapes(space, [shape])
+
+
+def test_one_shape_is_no_list_and_a_predicate_needs_a_function():
+    with pytest.raises(ValueError, match="regions are a list of shapes, not one Ball"):
+        Regions.from_shapes(PLANE, ELLIPSE)
+    with pytest.raises(ValueError, match="a predicate needs a function of states, not 3"):
+        Predicate(3)
 
 
 def test_distance_is_asked_of_what_knows_none():
