@@ -153,7 +153,7 @@ __all__ = [
     "write_demonstration",
 ]
 
-__version__ = "0.5.0"
+__version__ = "0.6.0"
 
 
 def __getattr__(name: str) -> Any:
