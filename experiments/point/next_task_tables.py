@@ -20,11 +20,12 @@ from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
 from experiments.point.streams import Purpose, stream
 from mlci.demonstrations import Task
-from mlci.evidence import posterior, rank_scores, total_gain
+from mlci.evidence import posterior, rank_evidence, total_gain
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
 from mlci.next_task import plausible, simulate_tasks
 from mlci.preparation import prepare
+from mlci.region_sizes import weights_by_size
 from mlci.spaces import Bools, Ints
 from mlci.task_outcomes import TaskOutcomes
 
@@ -80,10 +81,9 @@ def chosen_order(outcomes: list[TaskOutcomes], shown: Inference, pool: Ints, mos
     """The tasks of a pool in the order in which they are chosen, `most` of them."""
     left = pool.tolist()
     picked: list[int] = []
+    prior = shown.prior_none, weights_by_size(shown.hypotheses, shown.size_prior)
     for _ in range(most):
-        belief = plausible(
-            np.append(*posterior(total_gain(shown.evidence[picked]), shown.prior_none))
-        )
+        belief = plausible(np.append(*posterior(total_gain(shown.evidence[picked]), *prior)))
         best = max(left, key=lambda number: float(outcomes[number].information(belief)))
         left.remove(best)
         picked.append(best)
@@ -95,10 +95,12 @@ def found_after(inference: Inference, truth: Bools) -> dict[str, float]:
     count = len(inference.names)
     if not (count and truth.any()):
         return {"sure": np.nan, "settled": np.nan}
-    gains = np.array([total_gain(inference.evidence[: n + 1]) for n in range(count)])
-    rank = rank_scores(gains, gains > -np.inf)
+    prior = inference.prior_none, weights_by_size(inference.hypotheses, inference.size_prior)
+    evidence, violated = inference.evidence, inference.violated
+    rankings = [rank_evidence(evidence[:n], violated[:n], *prior) for n in range(1, count + 1)]
+    rank = np.array([ranking.rank for ranking in rankings])
     leads = np.min(rank[:, truth], axis=1) < np.min(rank[:, ~truth], axis=1, initial=np.inf)
-    belief, _ = posterior(gains, inference.prior_none)
+    belief = np.array([ranking.posterior for ranking in rankings])
     sure = leads & (np.sum(belief[:, truth], axis=1) > SURE)
     return {
         "sure": int(np.argmax(sure)) + 1 if sure.any() else np.nan,
@@ -150,6 +152,7 @@ def _model_pool(settings: Settings, point: PointInference) -> _Pool:
             np.array([of_task[repetition] for of_task in crossed], dtype=bool),
             prepared.reachable,
             settings.inference.prior,
+            size_prior=settings.inference.size_prior,
         )
         for repetition in range(repetitions if tasks else 0)
     ]

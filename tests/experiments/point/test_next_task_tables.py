@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tiny_point import composed
@@ -49,6 +51,22 @@ def test_what_has_been_shown_is_not_chosen_again_for_the_same_end() -> None:
     outcomes = [task_outcomes(np.repeat(each, 50, axis=0) > 0) for each in (one, nothing, both)]
     shown = inference([[0.5, 1, 1], [1, 1, 1], [1, 0.5, 0.5]], [[0, 0, 0], [0, 0, 0], [0, 1, 1]])
     assert chosen_order(outcomes, shown, np.array([1, 0, 2]), 3).tolist() == [2, 0, 1]
+
+
+def test_a_prior_by_size_counts_for_what_leads_and_for_what_is_chosen() -> None:
+    """Regions of 2 m and of 1 m explain alike, and the smaller one is 32 times as probable."""
+    space = StateSpace(Box([0.0], [3.0]), [False], ("place",))
+    regions = Regions.from_boxes(space, [Box([0.0], [2.0]), Box([2.0], [3.0])])
+    small, nothing = np.array([False, True]), np.zeros((2, 2), dtype=bool)
+    shown = Inference(regions, ("0", "1"), np.full((2, 2), 0.5), nothing, np.ones(2, bool))
+    sized = replace(shown, size_prior=5.0)
+    assert np.isnan(found_after(shown, small)["settled"])
+    assert found_after(sized, small)["settled"] == 1
+    # Half of the trajectories cross the larger region in task 0, and the smaller one in task 1.
+    halves = (np.repeat([[True, False], [False, False]], 50, axis=0), [1, 0])
+    outcomes = [task_outcomes(halves[0]), task_outcomes(halves[0][:, halves[1]])]
+    assert chosen_order(outcomes, shown, np.array([0, 1]), 2)[0] == 0
+    assert chosen_order(outcomes, sized, np.array([0, 1]), 2)[0] == 1
 
 
 @pytest.mark.parametrize("truth", ["c1", "none"])
