@@ -51,6 +51,9 @@ def infer_sets(
     evidence = SetEvidence.of(
         model, demonstrations, inference, hypotheses=hypotheses, exact_ends=exact_ends
     )
+    shape = (inference.avoidance.shape[1],) * 2
+    if prior.neighbours is not None and prior.neighbours.shape != shape:
+        raise ValueError(f"neighbours {prior.neighbours.shape} of a prior must be {shape}")
     if can_enumerate(evidence, prior):
         return enumerate_sets(evidence, prior)
     return sample_sets(evidence, prior, rng or np.random.default_rng(0), chains=chains, steps=steps)

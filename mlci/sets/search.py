@@ -90,6 +90,8 @@ def search(
     Raises:
         ValueError: a width below 1.
     """
+    if least != least or (most is not None and most < 0):
+        raise ValueError(f"least is a number, and most one from 0 up, not {least} and {most}")
     if width < 1:
         raise ValueError(f"a beam keeps at least one set, not {width}")
     beam: list[_Set] = [((), ())]

@@ -108,6 +108,8 @@ def select_regions(
     count = len(evidence.avoidance)
     if not count:
         raise ValueError("regions are selected by demonstrations, and there are none")
+    if len(names) != evidence.violated.shape[1]:
+        raise ValueError(f"{len(names)} names do not fit {evidence.violated.shape[1]} regions")
 
     def decreases(mask: Bools, candidates: Ints) -> Floats:
         gain = evidence.beside(mask)[candidates]

@@ -223,7 +223,15 @@ def estimate_weights(
     Raises:
         ValueError: the model keeps no moves.
     """
+    shape = len(demonstrations), len(inference.hypotheses)
+    if inference.avoidance.shape != shape:
+        raise ValueError(
+            f"{shape[0]} demonstrations do not fit an inference from {inference.avoidance.shape[0]}"
+        )
     chosen = best_forgiven(inference) if regions is None else np.atleast_1d(np.asarray(regions))
+    of_numbers = chosen.ndim == 1 and (chosen.dtype.kind in "iu" or not chosen.size)
+    if not of_numbers or np.any((chosen < 0) | (chosen >= shape[1])):
+        raise ValueError(f"regions are numbers from 0 to {shape[1] - 1}, not {chosen.tolist()}")
     of_model = np.arange(len(model.regions)) if hypotheses is None else np.flatnonzero(hypotheses)
     rates = inference.rates
     if inference.calibration is not None:

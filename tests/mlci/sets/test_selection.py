@@ -272,6 +272,11 @@ def test_what_cannot_be_selected_by_is_refused() -> None:
     evidence, regions = rectangle_world()
     with pytest.raises(ValueError, match="at least one set, not 0"):
         select_regions(evidence, regions.names, width=0)
+    for options in ({"least": np.nan}, {"most": -1}):
+        with pytest.raises(ValueError, match="least is a number, and most one from 0 up"):
+            select_regions(evidence, regions.names, **options)
+    with pytest.raises(ValueError, match="1 names do not fit"):
+        select_regions(evidence, regions.names[:1])
     with pytest.raises(ValueError, match="selected by demonstrations, and there are none"):
         select_regions(evidence.of_some([]), regions.names)
 

@@ -317,6 +317,9 @@ def test_what_does_not_fit_is_refused() -> None:
     demonstrations, inference = inferred(model)
     with pytest.raises(ValueError, match="1 demonstrations and 30 regions do not fit"):
         infer_sets(model, demonstrations[:1], inference)
+    strange = SetPrior(neighbours=sparse.csr_matrix((5, 5)), adjacency=1.0)
+    with pytest.raises(ValueError, match=r"neighbours \(5, 5\) of a prior must be \(30, 30\)"):
+        infer_sets(model, demonstrations, inference, strange)
 
 
 @pytest.mark.parametrize("worlds", [60, pytest.param(500, marks=pytest.mark.long)])

@@ -171,6 +171,17 @@ def test_hypotheses_are_numbered_among_the_regions_of_the_model() -> None:
     assert one.region == few.hypotheses.names[1]
 
 
+def test_what_no_weight_can_be_of_is_refused() -> None:
+    model, paths = _planar()
+    inference = infer(model, paths)
+    count = len(inference.hypotheses)
+    for regions in ([count], [-1], [0.5], [np.nan], [[0]]):
+        with pytest.raises(ValueError, match=f"regions are numbers from 0 to {count - 1}, not"):
+            estimate_weights(model, paths, inference, regions=regions)
+    with pytest.raises(ValueError, match="do not fit an inference from"):
+        estimate_weights(model, paths[1:], inference)
+
+
 def test_pairs_that_say_nothing_are_left_out() -> None:
     model, paths = _planar()
     inference = infer(model, paths)
