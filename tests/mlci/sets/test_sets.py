@@ -177,6 +177,25 @@ def test_without_pairs_it_is_the_inference() -> None:
         assert result.none == pytest.approx(each.posterior_none, abs=1e-12)
 
 
+def test_too_many_sets_are_sampled_by_the_options_that_are_given() -> None:
+    model, prior = small_model(), SetPrior.geometric(0.5, 0.5, 6)
+    demonstrations, _ = inferred(model)
+    inference = infer(model, demonstrations, exact_ends=False)
+    evidence = SetEvidence.of(model, demonstrations, inference, exact_ends=False)
+    result, again = (
+        infer_sets(
+            *(model, demonstrations, inference, prior),
+            **{"rng": rng, "chains": 2, "steps": 20, "exact_ends": False},
+        )
+        for rng in (np.random.default_rng(4), None)
+    )
+    for each, seed in ((result, 4), (again, 0)):
+        same = sample_sets(evidence, prior, np.random.default_rng(seed), chains=2, steps=20)
+        np.testing.assert_array_equal(each.members, same.members)
+        np.testing.assert_array_equal(each.weight, same.weight)
+        assert len(np.unique(each.members, axis=0)) > 1
+
+
 def test_hypotheses_may_be_some_of_the_models_regions() -> None:
     model = small_model()
     demonstrations, _ = inferred(model)
