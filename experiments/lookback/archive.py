@@ -221,11 +221,9 @@ class Archive:
         Raises:
             ArchiveError: there is none, or several.
         """
-        folder = Path(name).absolute()
-        if folder.parent == (self.results / "points").absolute():  # as `run.py` prints it
-            name = folder.name
-        listing = self._listings.get(name)
-        if isinstance(listing, StudyError):
+        if Path(name).absolute().parent == (self.results / "points").absolute():
+            name = Path(name).name  # as `run.py` prints it
+        if isinstance(listing := self._listings.get(name), StudyError):
             raise ArchiveError(str(listing))
         if listing is not None:
             return listing
@@ -256,9 +254,8 @@ class Archive:
 
     def _known(self, name: str) -> str:
         """The end of a message about an unknown name."""
-        if not self._listings:
-            return f" in {self.results}, which holds no study"
-        return did_you_mean(name, self._listings)
+        nothing = f" in {self.results}, which holds no study"
+        return did_you_mean(name, self._listings) if self._listings else nothing
 
 
 def _inner_folders(folder: Path) -> tuple[list[Path], list[str]]:
