@@ -37,11 +37,8 @@ def most_probable_area(
     gain: Floats, neighbours: scipy.sparse.csr_matrix, below: float = HALF
 ) -> Bools:
     """(C,) the regions of the area of the best region, the first one where several tie."""
-    members, group = _groups(gain, neighbours, below)
-    best = group[np.searchsorted(members, int(np.argmax(gain)))]
-    mask = np.zeros(len(gain), dtype=bool)
-    mask[members[group == best]] = True
-    return mask
+    group = _groups(gain[None], neighbours, below)[0]
+    return group == group[int(np.argmax(gain))]
 
 
 def area_scores(
@@ -55,28 +52,27 @@ def area_scores(
         good: (C,) which regions count, such as those that overlap the truth.
         below: how far below the best gain a region of an area may be [nat].
     """
-    rows = np.array([_scores(gain, neighbours, good, below) for gain in gains])
-    return AreaScores(*rows.reshape(-1, 3).T)
-
-
-def _scores(
-    gain: Floats, neighbours: scipy.sparse.csr_matrix, good: Bools, below: float
-) -> tuple[float, float, float]:
-    """Overlap, precision and share of one ranking's most probable area."""
-    best = np.max(gain)
-    members, group = _groups(gain, neighbours, below)
-    size, hits = np.bincount(group), np.bincount(group, good[members])
+    group, count = _groups(gains, neighbours, below), gains.shape[1]
+    size = np.bincount(group.ravel())[group]
+    hits = np.bincount(group.ravel(), np.broadcast_to(good, gains.shape).ravel())[group]
     # The area of each best region; with an infinite gain only equals tie.
-    mine = group[(gain[members] == best) | (gain[members] >= best - TIE)]
-    overlap, precision = hits[mine] > 0, hits[mine] / size[mine]
-    return float(overlap.mean()), float(precision.mean()), float(np.mean(size[mine]) / len(gain))
+    best = np.max(gains, axis=1, keepdims=True)
+    is_best = (gains == best) | (gains >= best - TIE)
+    overlap, precision, share = (
+        np.mean(values, axis=1, where=is_best) for values in (hits > 0, hits / size, size / count)
+    )
+    return AreaScores(overlap, precision, share)
 
 
-def _groups(gain: Floats, neighbours: scipy.sparse.csr_matrix, below: float) -> tuple[Ints, Ints]:
-    """Numbers of the regions that are good enough, and of the area that each belongs to."""
-    best = np.max(gain)
-    members = np.flatnonzero((gain >= best - below) | (gain == best))
+def _groups(gains: Floats, neighbours: scipy.sparse.csr_matrix, below: float) -> Ints:
+    """(B, C) number of the area that a region belongs to; what is not good enough is alone."""
+    best = np.max(gains, axis=1, keepdims=True)
+    is_member = (gains >= best - below) | (gains == best)
+    first, second = scipy.sparse.triu(neighbours, 1).nonzero()
+    ranking, pair = np.nonzero(is_member[:, first] & is_member[:, second])
     from scipy.sparse import csgraph
 
-    _, group = csgraph.connected_components(neighbours[members][:, members], directed=False)
-    return members, group
+    ends = [ranking * gains.shape[1] + side[pair] for side in (first, second)]
+    borders = scipy.sparse.coo_matrix((np.ones(len(pair), bool), ends), (gains.size, gains.size))
+    _, group = csgraph.connected_components(borders, directed=False)
+    return np.asarray(group, dtype=np.int64).reshape(gains.shape)
