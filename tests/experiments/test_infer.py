@@ -142,7 +142,7 @@ def test_soft_or_hard_is_told_on_demand(recorded: Path) -> None:
     answer = json.loads((saved(recorded) / "answer.json").read_text())
     first, second = answer["weights"]
     assert first["region"] == answer["first"]["region"] != second["region"]
-    assert f"soft or hard? region {first['region']} " in " ".join(done.stdout.split())
+    assert f"soft or hard? region {first['region']}, " in " ".join(done.stdout.split())
     refused = infer(recorded, *coarse, "soft=2", "transition.samples=200")
     assert refused.returncode == 2
     assert "soft: 2, but a weight needs every single move, and 36000000 are more" in refused.stderr
