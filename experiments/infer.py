@@ -9,10 +9,8 @@ if __name__ == "__main__":  # before all that takes time to import
 
     sys.exit(app.infer())
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -41,7 +39,7 @@ from experiments.point.stages import discretized_model
 from experiments.progress import begin, steps_shown
 from experiments.terminal import complain, counted, entry, say
 from experiments.tracking.environment import environment
-from experiments.tracking.files import csv_bytes, digest, replace_file
+from experiments.tracking.files import csv_bytes, digest, json_bytes, replace_file
 from experiments.tracking.store import Store
 from experiments.tracking.trees import canonical_json, plain
 from mlci.answers import Answer, answer
@@ -244,14 +242,14 @@ def _save(
         "sets": None if sets is None else set_record(sets, inference.hypotheses.names),
         "recordings": [each.record(space) for each in checks],
     }
-    replace_file(folder / "answer.json", _json_bytes(answer_record))
+    replace_file(folder / "answer.json", json_bytes(answer_record))
     record = {
         **made_from,
         "demonstrations": settings.demonstrations,
         "not_used": [str(problem) for problem in problems],
         **environment(results_folder(settings)),
     }
-    replace_file(folder / "record.json", _json_bytes(record))
+    replace_file(folder / "record.json", json_bytes(record))
     return folder
 
 
@@ -287,8 +285,3 @@ def _page(
             *(f"not used: {problem}" for problem in readings.problems),
         ],
     ).encode(errors="backslashreplace")
-
-
-def _json_bytes(tree: dict[str, Any]) -> bytes:
-    """A tree as it is written to a file."""
-    return json.dumps(tree, indent=1, allow_nan=False).encode() + b"\n"

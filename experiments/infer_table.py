@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,11 +19,12 @@ from experiments.console import gain_words, probability
 from experiments.progress import begin, steps_shown
 from experiments.terminal import complain, entry, table_lines
 from experiments.tracking.environment import environment
-from experiments.tracking.files import csv_bytes, digest, replace_file
+from experiments.tracking.files import csv_bytes, digest, json_bytes, replace_file
 from experiments.tracking.trees import canonical_json, plain
 from mlci.answers import listed
 from mlci.credible_sets import most_probable
 from mlci.evidence import Rates
+from mlci.json_numbers import finite
 from mlci.recordings.recording import Remark, shown_path
 from mlci.recordings.table_paths import read_table_paths
 from mlci.sets.search import Selection
@@ -214,8 +214,7 @@ def _save(
         ("answer", _answer_record(world, paths, inference, selection)),
         ("record", record),
     ):
-        content = json.dumps(plain(tree), indent=1, allow_nan=False).encode() + b"\n"
-        replace_file(folder / f"{name}.json", content)
+        replace_file(folder / f"{name}.json", json_bytes(plain(tree)))
     return folder
 
 
@@ -239,7 +238,7 @@ def _answer_record(
     return {
         "first": {
             "hypothesis": names[first],
-            "gain": _finite(ranking.gain[first]),
+            "gain": finite(ranking.gain[first]),
             "posterior": float(ranking.posterior[first]),
         },
         "posterior_none": float(ranking.posterior_none),
@@ -255,7 +254,7 @@ def _answer_record(
             {
                 "name": name,
                 "moves": len(path.actions),
-                "evidence_for_first": _finite(evidence[first]),
+                "evidence_for_first": finite(evidence[first]),
                 "violates": [names[i] for i in np.flatnonzero(violated)],
             }
             for name, path, evidence, violated in zip(
@@ -263,8 +262,3 @@ def _answer_record(
             )
         ],
     }
-
-
-def _finite(number: float) -> float | None:
-    """A number for JSON."""
-    return float(number) if np.isfinite(number) else None

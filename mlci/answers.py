@@ -12,6 +12,7 @@ import numpy as np
 from mlci.demonstrations import Demonstration
 from mlci.grids import Grid
 from mlci.inference import Inference
+from mlci.json_numbers import finite
 from mlci.maxent import TrajectoryDistribution
 from mlci.misfit import SAMPLES, Misfit, misfit
 from mlci.next_task import NextTask
@@ -98,7 +99,7 @@ class Answer:
         return {
             "first": {
                 "region": names[first],
-                "gain": _finite(inference.gain[first]),
+                "gain": finite(inference.gain[first]),
                 "posterior": float(inference.posterior[first]),
             },
             "posterior_none": inference.posterior_none,
@@ -111,8 +112,8 @@ class Answer:
                     {
                         "regions": [names[i] for i in area.regions],
                         "probability": area.probability,
-                        "lower": dict(zip(space.names, map(_finite, area.hull.lower), strict=True)),
-                        "upper": dict(zip(space.names, map(_finite, area.hull.upper), strict=True)),
+                        "lower": dict(zip(space.names, map(finite, area.hull.lower), strict=True)),
+                        "upper": dict(zip(space.names, map(finite, area.hull.upper), strict=True)),
                     }
                     for area in credible.areas
                 ],
@@ -125,9 +126,9 @@ class Answer:
                     "share_of_gain": float(self.support.share[j]),
                     "first_without": names[self.support.first_without[j]],
                     "regions": int(self.misfit.count[j]),
-                    "regions_p": _finite(self.misfit.count_p[j]),
+                    "regions_p": finite(self.misfit.count_p[j]),
                     "distance": float(self.misfit.distance[j]),
-                    "distance_p": _finite(self.misfit.distance_p[j]),
+                    "distance_p": finite(self.misfit.distance_p[j]),
                 }
                 for j, name in enumerate(inference.names)
             ],
@@ -269,11 +270,6 @@ def _shared(size_prior: float) -> str:
     """How the prior goes to regions."""
     power = f"by size to the power of {-size_prior:g}" if size_prior else "equally"
     return f"the rest shared {power}"
-
-
-def _finite(number: float) -> float | None:
-    """A number for JSON."""
-    return float(number) if np.isfinite(number) else None
 
 
 def listed(names: Sequence[str], most: int = 8) -> str:

@@ -26,6 +26,7 @@ import numpy as np
 
 from mlci.demonstrations import Demonstration
 from mlci.maxent import TrajectoryDistribution
+from mlci.misfit import sample_crossings
 from mlci.spaces import Floats
 from mlci.tabular import TabularModel
 
@@ -116,8 +117,7 @@ def crossings(
     for row, demonstration in zip(found, demonstrations, strict=True):
         distribution = _distribution(model, demonstration)
         if distribution.is_possible:
-            cells, moves = distribution.sample(paths, rng)
-            row[:] = np.mean(model.crossed(cells[:, :-1], moves), axis=0)
+            row[:] = np.mean(sample_crossings(distribution, paths, rng), axis=0)
     return found
 
 

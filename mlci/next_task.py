@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from mlci.calibration import certain_by_ends
 from mlci.demonstrations import Task
 from mlci.inference import Inference
+from mlci.json_numbers import finite
 from mlci.maxent import TrajectoryDistribution
 from mlci.misfit import sample_crossings
 from mlci.models import tabular_forecast
@@ -57,10 +58,7 @@ class NextTask:
         """The same for programs, fit for JSON; a side of a goal that is free is None."""
         goal = self.task.goal
         lower, upper = (
-            {
-                name: float(end) if np.isfinite(end) else None
-                for name, end in zip(space.names, side, strict=True)
-            }
+            {name: finite(end) for name, end in zip(space.names, side, strict=True)}
             for side in (goal.lower, goal.upper)
         )
         return {

@@ -9,6 +9,7 @@ import numpy as np
 
 from mlci.evidence import rank_scores
 from mlci.inference import Inference
+from mlci.json_numbers import finite
 from mlci.region_sizes import region_sizes
 from mlci.spaces import Floats
 
@@ -54,8 +55,8 @@ class SizeBias:
         """The numbers, for a program."""
         return {
             "first": self.first,
-            "ratio": _finite(self.ratio),
-            "correlation": _finite(self.correlation),
+            "ratio": finite(self.ratio),
+            "correlation": finite(self.correlation),
             "first_by_size": self.by_size,
             "size_prior": self.size_prior,
         }
@@ -91,8 +92,3 @@ def _rank_correlation(gain: Floats, size: Floats) -> float:
         return np.nan
     one, other = (rank - np.mean(rank) for rank in ranks)
     return float(one @ other / np.sqrt((one @ one) * (other @ other)))
-
-
-def _finite(number: float) -> float | None:
-    """A number for JSON."""
-    return float(number) if np.isfinite(number) else None

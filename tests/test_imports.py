@@ -40,9 +40,11 @@ MLCI = {
     "mlci.crossings": "mlci.regions",
     "mlci.differences": "mlci.spaces",
     "mlci.systems": "mlci.differences",
+    "mlci.wrapped": "mlci.systems",
+    "mlci.json_numbers": "",
     "mlci.system_check": "mlci.systems",
-    "mlci.control.effort": "mlci.systems",
-    "mlci.strength": "mlci.systems",
+    "mlci.control.effort": "mlci.wrapped",
+    "mlci.strength": "mlci.wrapped",
     "mlci.simulate": "mlci.systems",
     "mlci.safety.upwind": "mlci.compiled mlci.grids",
     "mlci.safety.reachability": "mlci.regions mlci.system_check mlci.safety.upwind",
@@ -78,12 +80,12 @@ MLCI = {
     "mlci.sets.posterior": "mlci.sets.chains mlci.sets.evidence",
     "mlci.sets.sampling": "mlci.sets.posterior",
     "mlci.sets.inference": "mlci.sets.sampling",
-    "mlci.sets.search": "mlci.spaces",
+    "mlci.sets.search": "mlci.evidence",
     "mlci.sets.selection": "mlci.worlds.first_exit mlci.worlds.fixed_horizon "
     "mlci.sets.search mlci.sets.posterior",
     "mlci.worlds.inference": "mlci.worlds.causal_entropy mlci.evidence "
     "mlci.worlds.first_exit mlci.worlds.fixed_horizon",
-    "mlci.baselines": "mlci.maxent",
+    "mlci.baselines": "mlci.misfit",
     "mlci.diagnosis": "mlci.tabular",
     "mlci.end_moves": "mlci.tabular",
     "mlci.recursions": "mlci.compiled mlci.tabular",
@@ -100,8 +102,8 @@ MLCI = {
     "mlci.inference": "mlci.crossings mlci.forecasts mlci.rule_breaking mlci.credible_sets "
     "mlci.demonstrations mlci.sampling_errors",
     "mlci.plot": "mlci.inference mlci.outlines",
-    "mlci.sampled.passage": "mlci.simulate",
-    "mlci.sampled.modes": "mlci.demonstrator mlci.sampled.passage",
+    "mlci.sampled.passage": "mlci.control.control_problem",
+    "mlci.sampled.modes": "mlci.demonstrator mlci.sampled.passage mlci.wrapped",
     "mlci.sampled.truncated_normal": "mlci.spaces",
     "mlci.sampled.local_policies": "mlci.sampled.modes mlci.sampled.truncated_normal",
     "mlci.sampled.weights": "mlci.spaces",
@@ -121,14 +123,15 @@ MLCI = {
     "mlci.soft.distribution": "mlci.maxent mlci.soft.time_inside",
     "mlci.soft.weight": "mlci.inference mlci.soft.distribution",
     "mlci.credible_sets": "mlci.evidence mlci.regions",
-    "mlci.size_bias": "mlci.inference",
+    "mlci.size_bias": "mlci.inference mlci.json_numbers",
     "mlci.support": "mlci.inference",
     "mlci.misfit": "mlci.maxent",
     "mlci.answers": "mlci.next_task mlci.size_bias mlci.soft.weight mlci.support "
     "mlci.temperature mlci.ties",
     "mlci.metrics": "mlci.evidence",
     "mlci.task_outcomes": "mlci.evidence",
-    "mlci.next_task": "mlci.calibration mlci.misfit mlci.models mlci.task_outcomes",
+    "mlci.next_task": "mlci.calibration mlci.json_numbers mlci.misfit mlci.models "
+    "mlci.task_outcomes",
 }
 # What mlci may import of others: no configs, no formats but those of recordings, no figures.
 MATHEMATICS = "contourpy numpy scipy numba pandas pyarrow joblib pint openpyxl ezc3d"

@@ -14,6 +14,7 @@ from mlci.credible_sets import neighbours
 from mlci.demonstrations import Demonstration
 from mlci.evidence import Rates
 from mlci.inference import Inference
+from mlci.json_numbers import finite
 from mlci.sets.inference import infer_sets
 from mlci.sets.posterior import SetPosterior, SetPrior
 from mlci.spaces import Bools
@@ -95,13 +96,8 @@ def set_record(sets: SetPosterior, names: Sequence[str]) -> dict[str, Any]:
         "sampled": None
         if check is None
         else {
-            "largest_r_hat": _finite(np.max(check.r_hat)),
+            "largest_r_hat": finite(np.max(check.r_hat)),
             "effective_samples": float(np.min(check.effective)),
             "standard_errors": dict(zip(names, check.standard_error[:-1].tolist(), strict=True)),
         },
     }
-
-
-def _finite(number: float) -> float | None:
-    """A number for JSON."""
-    return float(number) if np.isfinite(number) else None

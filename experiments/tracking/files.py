@@ -10,13 +10,14 @@ from __future__ import annotations
 import ctypes
 import errno
 import hashlib
+import json
 import os
 import secrets
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -120,6 +121,11 @@ def csv_bytes(frame: pd.DataFrame, *, header: bool = True) -> bytes:
     """A table as CSV, floats exact; without its header, the rows alone."""
     text: str = frame.to_csv(index=False, header=header, lineterminator="\n")
     return text.encode()
+
+
+def json_bytes(tree: Mapping[str, Any]) -> bytes:
+    """A tree as JSON for people and programs, a key a line."""
+    return json.dumps(tree, indent=1, allow_nan=False).encode() + b"\n"
 
 
 def _exchanged(one: Path, other: Path) -> bool:

@@ -191,8 +191,8 @@ def _runs(folder: Path) -> dict[str, Any]:
     """What is told of how a study's points ran; nothing where it cannot be read."""
     try:
         runs = read_sealed(_listing(folder, RUNS))
-        return {key: runs[key] for key in _OF_RUNS if key in runs}
-    except (OSError, SealError):
+        return {key: runs[key] for key in _OF_RUNS}
+    except (OSError, SealError, KeyError):
         return {}
 
 

@@ -93,10 +93,7 @@ class ControlProblem:
     @cached_property
     def limits(self) -> tuple[Floats, Floats]:
         """(m,) least and largest controls; infinite without a limit."""
-        if self.limit is None:
-            free = np.full(self.system.control_box.dimension, np.inf)
-            return -free, free
-        return self.limit.lower, self.limit.upper
+        return control_limits(self.system, self.limit)
 
     def of(self, members: Ints) -> ControlProblem:
         """The problems of some members only."""
@@ -174,3 +171,11 @@ def terminal_excess(problem: ControlProblem, states: Floats) -> tuple[Floats, Fl
     offset = np.where(bounded, offset, 0.0)
     excess = np.sign(offset) * np.maximum(np.abs(offset) - (upper - lower) / 2, 0.0)
     return excess, (bounded & ((excess != 0) | (lower == upper))).astype(float)
+
+
+def control_limits(system: System, limit: Box | None) -> tuple[Floats, Floats]:
+    """(m,) least and largest controls within a limit; infinite without one."""
+    if limit is None:
+        free = np.full(system.control_box.dimension, np.inf)
+        return -free, free
+    return limit.lower, limit.upper

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlci.spaces import Box, Floats, StateSpace
-from mlci.systems import System
+from mlci.spaces import Floats
+from mlci.wrapped import Wrapped
 
 
 @dataclass(frozen=True, eq=False)
-class WithEffort(System):
+class WithEffort(Wrapped):
     """A system that moves as another does and has the reward r(x, u) - sum_d price_d z_d^2.
 
     Attributes:
@@ -22,7 +22,6 @@ class WithEffort(System):
         ValueError: not n + m prices, or one above 0 for a state that goes round.
     """
 
-    system: System
     price: Floats
 
     def __post_init__(self) -> None:
@@ -33,20 +32,6 @@ class WithEffort(System):
         if np.any(price[: space.dimension][space.periodic]):
             raise ValueError("the square of a state that goes round jumps: give it the price 0")
         object.__setattr__(self, "price", price)
-
-    @property
-    def space(self) -> StateSpace:
-        return self.system.space
-
-    @property
-    def control_box(self) -> Box:
-        return self.system.control_box
-
-    def dynamics(self, states: Floats, controls: Floats) -> Floats:
-        return self.system.dynamics(states, controls)
-
-    def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
-        return self.system.jacobians(states, controls)
 
     def running_reward(self, states: Floats, controls: Floats) -> Floats:
         n = states.shape[-1]

@@ -15,6 +15,7 @@ the levels at its ends, less half its length, bounds it from below. Chords that 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -87,22 +88,26 @@ class KeepOut:
         by_dimension = (each.T for each in (*samples, *rates))
         _approach(*boxes, *by_dimension, step, distance, least)
         if len(self.others):
-            distance[:] = np.minimum(distance, self.others.signed_distance(samples[1]))
-            self._approach_others(samples, rates, step, least)
+            ends = [self.others.signed_distance(sample) for sample in samples]
+            self._approach_others(samples, rates, step, ends, least)
+            distance[:] = np.minimum(distance, ends[1])
 
     def _approach_others(
         self,
         samples: tuple[Floats, Floats],
         rates: tuple[Floats, Floats],
         step: float,
+        ends: Sequence[Floats],
         least: Floats,
     ) -> None:
-        """Lower least (B,) by what is no box; arguments as in `approach`."""
+        """Lower least (B,) by what is no box, whose signed distance (B,) at both samples is `ends`.
+
+        Other arguments are as in `approach`.
+        """
         counted = self.counted
         chord = self.others.space.difference(samples[1], samples[0])
         change = np.linalg.norm((rates[1] - rates[0])[:, counted], axis=1)
         bow, length = step / 4 * change, np.linalg.norm(chord[:, counted], axis=1)
-        ends = [self.others.signed_distance(sample) for sample in samples]
         near = np.flatnonzero((ends[0] + ends[1] - length) / 2 - bow < least)
         share = np.linspace(0, 1, _PARTS + 1)[:, None]
         places = samples[0][near, None] + share * chord[near, None]

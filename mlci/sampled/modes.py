@@ -16,8 +16,8 @@ import numpy as np
 from mlci.control.ilqr import Solution, optimize
 from mlci.demonstrator import first_guesses
 from mlci.sampled.passage import Passage
-from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
-from mlci.systems import System
+from mlci.spaces import Bools, Floats, Ints, StateSpace
+from mlci.wrapped import Wrapped
 
 GOAL_SHARE = 0.7  # of a goal's half width: the Gaussian that loses fewest samples on a box
 _HOLD = 0.5  # s for which a first guess holds a control
@@ -29,31 +29,13 @@ _TURNS = 6  # windings on each side are looked at no further
 
 
 @dataclass(frozen=True, eq=False)
-class Unrolled(System):
+class Unrolled(Wrapped):
     """A system whose space does not wrap: states that are whole turns apart are different."""
-
-    system: System
 
     @property
     def space(self) -> StateSpace:
         space = self.system.space
         return StateSpace(space.bounds, np.zeros_like(space.periodic), space.names, space.units)
-
-    @property
-    def control_box(self) -> Box:
-        return self.system.control_box
-
-    def dynamics(self, states: Floats, controls: Floats) -> Floats:
-        return self.system.dynamics(states, controls)
-
-    def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
-        return self.system.jacobians(states, controls)
-
-    def running_reward(self, states: Floats, controls: Floats) -> Floats:
-        return self.system.running_reward(states, controls)
-
-    def reward_derivatives(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
-        return self.system.reward_derivatives(states, controls)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mlci.control.control_problem import control_limits
 from mlci.simulate import RK4, Integrator, in_substeps
 from mlci.spaces import Bools, Box, Floats, middle_and_half
 from mlci.systems import System
@@ -80,10 +81,7 @@ class Passage:
     @property
     def limits(self) -> tuple[Floats, Floats]:
         """(m,) least and largest controls."""
-        if self.limit is None:
-            free = np.full(self.system.control_box.dimension, np.inf)
-            return -free, free
-        return self.limit.lower, self.limit.upper
+        return control_limits(self.system, self.limit)
 
     def goal_price(self, share: float) -> Floats:
         """(n,) price of the squared distance from the goal's middle, for a Gaussian in its place.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mlci.evidence import TIE
 from mlci.spaces import Bools, Floats, Ints
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 _Set = tuple[tuple[int, ...], tuple[float, ...]]  # hypotheses in order, and their decreases
 
-_TIE = 1e-9  # nat: decreases closer than this are equal, and the first hypothesis is taken
 
 Decreases = Callable[[Bools, Ints], Floats]
 
@@ -126,7 +126,7 @@ def _best(sets: list[_Set], width: int) -> list[_Set]:
     order: list[int] = []
     while len(order) < min(width, len(sets)):
         best = np.max(total)
-        order.append(int(np.argmax((total > best - _TIE) | (total == best))))  # also if infinite
+        order.append(int(np.argmax((total > best - TIE) | (total == best))))  # also if infinite
         total[order[-1]] = -np.inf
     return [sets[place] for place in order]
 

@@ -79,11 +79,12 @@ def test_cells_too_far_from_the_goal_are_passed_over() -> None:
     assert near.sum() < every.sum()
 
 
-def test_dynamics_that_change_too_much_within_a_cell_are_told() -> None:
+@pytest.mark.parametrize("strength", [3.0, -3.0])
+def test_dynamics_that_change_too_much_within_a_cell_are_told(strength: float) -> None:
     """A gust between the centres of cells, which no bound from the centres can know of."""
 
     def rates(x, u):
-        gust = np.where(np.abs((x[..., 0] % 1.0) - 0.25) < 0.1, 3.0, 0.0)
+        gust = np.where(np.abs((x[..., 0] % 1.0) - 0.25) < 0.1, strength, 0.0)
         return (0.1 * u[..., 0] + gust,)
 
     space = StateSpace(Box([0.0], [20.0]), [False], ("place",))

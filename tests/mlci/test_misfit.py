@@ -2,52 +2,26 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
-from toy_models import toy_model
+from toy_models import every_trajectory, toy_world
 
 from mlci.demonstrations import Task
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.misfit import misfit, sample_crossings
 from mlci.regions import Regions
-from mlci.spaces import Bools, Box, Floats
+from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator
-from mlci.tabular import TabularModel, action_grid, discretize
+from mlci.tabular import action_grid, discretize
 
 STEPS = 5
-
-
-def toy_world() -> TabularModel:
-    """Six cells, three moves of each, four regions that a move crosses rarely."""
-    rng = np.random.default_rng(7)
-    successor = rng.integers(0, 6, size=(6, 3))
-    crosses = rng.random((18, 4)) < [0.05, 0.1, 0.15, 0.2]
-    return toy_model(successor, rng.normal(size=(6, 3)), np.ones((6, 3), bool), crosses)
-
-
-def every_trajectory(model: TabularModel, goal: int) -> tuple[Bools, Floats]:
-    """Which regions each trajectory from cell 0 crosses, and its probability, by listing them."""
-    crosses = model.kept.crosses.toarray().reshape(model.states, model.moves, -1)
-    crossed, weight = [], []
-    for sequence in itertools.product(range(model.moves), repeat=STEPS):
-        state, reward, row = 0, 0.0, np.zeros(4, dtype=bool)
-        for move in sequence:
-            reward += model.kept.reward[state, move]
-            row |= crosses[state, move]
-            state = model.kept.successor[state, move]
-        if state == goal:
-            crossed.append(row)
-            weight.append(np.exp(reward))
-    return np.array(crossed), np.array(weight) / np.sum(weight)
 
 
 def test_p_is_the_weight_of_trajectories_at_least_as_extreme() -> None:
     """For every set of regions that a trajectory can cross; 40000 draws, five standard errors."""
     model, goal, draws = toy_world(), 3, 40_000
-    crossed, weight = every_trajectory(model, goal)
+    crossed, weight = every_trajectory(model, goal, STEPS)
     phi = weight @ crossed
     sets = np.unique(crossed, axis=0)
     assert len(sets) > 5

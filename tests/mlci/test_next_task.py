@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import entropy as entropy_of
-from toy_models import toy_model
+from toy_models import every_trajectory, toy_model, toy_world
 
 import mlci
 from mlci.demonstrations import Demonstration, Task
@@ -22,14 +21,6 @@ from mlci.spaces import Bools, Box, Floats, StateSpace
 from mlci.tabular import TabularModel
 
 STEPS, REGIONS = 5, 4
-
-
-def toy_world() -> TabularModel:
-    """Six cells, three moves of each, four regions that a move crosses rarely."""
-    rng = np.random.default_rng(7)
-    successor = rng.integers(0, 6, size=(6, 3))
-    crosses = rng.random((18, REGIONS)) < [0.05, 0.1, 0.15, 0.2]
-    return away(toy_model(successor, rng.normal(size=(6, 3)), np.ones((6, 3), bool), crosses))
 
 
 def away(model: TabularModel) -> TabularModel:
@@ -52,22 +43,6 @@ def nothing_seen(
     return Inference(regions, (), none, none.astype(bool), np.zeros(count, dtype=bool), rates=rates)
 
 
-def every_trajectory(model: TabularModel, goal: int) -> tuple[Bools, Floats]:
-    """What each trajectory from cell 0 crosses, and its probability, by listing them."""
-    crosses = model.kept.crosses.toarray().reshape(model.states, model.moves, -1)
-    crossed, weight = [], []
-    for sequence in itertools.product(range(model.moves), repeat=STEPS):
-        state, reward, row = 0, 0.0, np.zeros(REGIONS, dtype=bool)
-        for move in sequence:
-            reward += model.kept.reward[state, move]
-            row |= crosses[state, move]
-            state = model.kept.successor[state, move]
-        if state == goal:
-            crossed.append(row)
-            weight.append(np.exp(reward))
-    return np.array(crossed), np.array(weight) / np.sum(weight)
-
-
 def exact_information(model: TabularModel, goal: int, belief: Floats, rates: Rates) -> float:
     """The mutual information of truth and D, from the distribution of D under each truth.
 
@@ -75,7 +50,7 @@ def exact_information(model: TabularModel, goal: int, belief: Floats, rates: Rat
     agents whom the model does not describe crosses nothing, and a share breaks rules. Where none
     is left, the task is refused.
     """
-    crossed, weight = every_trajectory(model, goal)
+    crossed, weight = every_trajectory(model, goal, STEPS)
     crossed = np.vstack([crossed, np.zeros((1, REGIONS), dtype=bool)])
     eta, eps = rates.model_error, rates.rule_breaking
     free = np.append((1 - eta) * weight, eta)
@@ -95,7 +70,7 @@ def exact_information(model: TabularModel, goal: int, belief: Floats, rates: Rat
 @pytest.mark.parametrize("rates", [PAPER, Rates(0.1), Rates(0.1, 0.1)])
 def test_information_is_exact_but_for_sampling(rates: Rates) -> None:
     """2000 trajectories a task: within four of the standard errors that are stated."""
-    model = toy_world()
+    model = away(toy_world())
     goals = [goal for goal in range(6) if goal in model.kept.successor]
     inference = nothing_seen(model, rates)
     belief = np.append(inference.posterior, inference.posterior_none)
@@ -113,7 +88,7 @@ def test_information_is_exact_but_for_sampling(rates: Rates) -> None:
 
 
 def test_the_first_task_is_the_most_informative_by_enumeration() -> None:
-    model = toy_world()
+    model = away(toy_world())
     inference = nothing_seen(model)
     belief = np.append(inference.posterior, inference.posterior_none)
     exact = [exact_information(model, goal, belief, PAPER) for goal in (1, 2, 3)]
@@ -179,7 +154,7 @@ def test_what_one_task_reveals_is_not_expected_of_the_next() -> None:
 
 def test_each_task_has_trajectories_of_its_own_by_the_seed() -> None:
     """The same task again is drawn anew, and a task more changes none before it."""
-    model = toy_world()
+    model = away(toy_world())
     task, inference = task_to(2), nothing_seen(model)
 
     done: list[tuple[int, int]] = []

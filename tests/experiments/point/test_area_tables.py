@@ -35,3 +35,17 @@ def test_tables_of_areas(tmp_path: Path) -> None:
     climb = areas[areas["method"] == "climb"].groupby("demonstrations")["regions"].mean()
     for size in (1, 3):
         assert cells[f"climb_{size}"].sum() == pytest.approx(climb[size])
+
+
+def test_a_truth_that_hypotheses_cover_in_part(tmp_path: Path) -> None:
+    """Slices from 0.3 to 0.8 m and on to 1 m, and the wall from 0.6 to 1.2 m, a third of which is in
+    neither."""
+    slices = "[{lower: [0.3, null], upper: [0.8, null]}, {lower: [0.8, null], upper: [1.0, null]}]"
+    words = ["hypotheses.shape=null", f"hypotheses.boxes={slices}"]
+    words += ["areas.subsets=1", "areas.demonstrations=[1]"]
+    tables = run_point(read_config(composed(*TINY, *words))[0], Store(tmp_path), lambda line: None)
+    np.testing.assert_allclose(tables["area_map"]["in_truth"], [0.4, 1.0], atol=0.03)
+    single = tables["areas"].set_index("method").loc["single"]
+    assert single["recall"] == pytest.approx(1 / 3, abs=0.03)  # 0.2 m of 0.6 m
+    other = 0.2 / single["precision"] - 0.2  # of the slice that comes first
+    assert single["iou"] == pytest.approx(0.2 / (0.6 + other), abs=0.03)

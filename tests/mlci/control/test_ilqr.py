@@ -135,14 +135,8 @@ def test_goal_without_winding_is_the_one_nearest_to_the_start():
     assert np.mean(turns[True] > 0.5) > 0.2
 
 
-@pytest.fixture(scope="module")
-def swing_effort():
-    """Effort of the cheapest swing from (0.5, 0) to (3, 0) in 5 s, by Pontryagin's conditions."""
-
-    # Minimum of int u^2: u = -q / 2, with costates p' = -q cos(theta), q' = -p.
-    def motion(_, y):
-        angle, speed, p, q = y
-        return np.stack([speed, np.sin(angle) - q / 2, -q * np.cos(angle), -p])
+def swing_by_pontryagin(motion):
+    """Fine times, and states and costates (4, .) of the swing from (0.5, 0) to (3, 0) in 5 s."""
 
     def ends(first, last):
         return np.array([first[0] - 0.5, first[1], last[0] - 3.0, last[1]])
@@ -152,7 +146,20 @@ def swing_effort():
     exact = solve_bvp(motion, ends, time, line, tol=1e-8, max_nodes=100_000)
     assert exact.success
     fine = np.linspace(0, 5, 20_001)
-    effort = np.trapezoid((exact.sol(fine)[3] / 2) ** 2, fine)
+    return fine, exact.sol(fine)
+
+
+@pytest.fixture(scope="module")
+def swing_effort():
+    """Effort of the cheapest swing from (0.5, 0) to (3, 0) in 5 s, by Pontryagin's conditions."""
+
+    # Minimum of int u^2: u = -q / 2, with costates p' = -q cos(theta), q' = -p.
+    def motion(_, y):
+        angle, speed, p, q = y
+        return np.stack([speed, np.sin(angle) - q / 2, -q * np.cos(angle), -p])
+
+    fine, path = swing_by_pontryagin(motion)
+    effort = np.trapezoid((path[3] / 2) ** 2, fine)
     assert effort == pytest.approx(2.3849, abs=1e-4)
     return effort
 
@@ -236,15 +243,7 @@ def test_swing_with_a_reward_of_its_own_is_the_one_that_pontryagin_says(system):
         pull = -q * np.cos(angle) - system.slope(angle)
         return np.stack([speed, np.sin(angle) + system.control(q), pull, -p])
 
-    def ends(first, last):
-        return np.array([first[0] - 0.5, first[1], last[0] - 3.0, last[1]])
-
-    time = np.linspace(0, 5, 200)
-    line = np.stack([np.linspace(0.5, 3, 200), np.full(200, 0.5), 0 * time, 0 * time])
-    exact = solve_bvp(motion, ends, time, line, tol=1e-8, max_nodes=100_000)
-    assert exact.success
-    fine = np.linspace(0, 5, 20_001)
-    path = exact.sol(fine)
+    fine, path = swing_by_pontryagin(motion)
     controls = system.control(path[3])
     cost = np.trapezoid(-system.running_reward(path[:2].T, controls[:, None]), fine)
     # What |u|^2 alone would choose costs more by far than the tolerances below.
