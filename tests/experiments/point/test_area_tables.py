@@ -38,7 +38,7 @@ def test_tables_of_areas(tmp_path: Path) -> None:
 
 
 def test_a_truth_that_hypotheses_cover_in_part(tmp_path: Path) -> None:
-    """Slices from 0.3 to 0.8 m and on to 1 m; of the wall, from 0.6 to 1.2 m, neither has a third."""
+    """Slices 0.3 to 0.8 m and on to 1 m; of the wall, 0.6 to 1.2 m, neither has a third."""
     slices = "[{lower: [0.3, null], upper: [0.8, null]}, {lower: [0.8, null], upper: [1.0, null]}]"
     words = ["hypotheses.shape=null", f"hypotheses.boxes={slices}"]
     words += ["areas.subsets=1", "areas.demonstrations=[1]"]
