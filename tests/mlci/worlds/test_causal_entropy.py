@@ -52,7 +52,7 @@ def test_it_maximises_reward_and_causal_entropy() -> None:
             now = np.einsum("s,sa,sap->p", now, policy, chances)
         return -total
 
-    best = minimize(loss, np.zeros(30), method="BFGS", options={"gtol": 1e-7})
+    best = minimize(loss, np.zeros(30), method="SLSQP", jac="3-point", options={"ftol": 1e-14})
     agent = CausalEntropy(table, steps=2)
     assert -best.fun == pytest.approx(table.start @ agent.values[0], abs=1e-8)
 
