@@ -70,7 +70,7 @@ def main() -> int:
         0; 2 if something that was asked for is not there.
     """
     options = _parser().parse_args()
-    results = Path(os.path.realpath(options.results or default_results()))
+    results = Path(os.path.realpath(os.path.expanduser(options.results or default_results())))
     if isinstance(sys.stdout, io.TextIOWrapper):  # names of files need not suit a terminal
         sys.stdout.reconfigure(errors="backslashreplace")
     try:

@@ -53,7 +53,7 @@ class CredibleSet:
 
     def __str__(self) -> str:
         none = "no constraint" if self.has_none else ""
-        regions = f"{_counted(len(self.regions), 'region')} in {_counted(len(self.areas), 'area')}"
+        regions = f"{counted(len(self.regions), 'region')} in {counted(len(self.areas), 'area')}"
         return " and ".join(filter(None, [none, regions if len(self.regions) else ""]))
 
 
@@ -173,6 +173,6 @@ def _arc(lower: Floats, upper: Floats, period: float) -> tuple[float, float]:
     return float(arcs[best, 0]), float(arcs[best, 0] + extent[best])
 
 
-def _counted(count: int, noun: str) -> str:
+def counted(count: int, noun: str) -> str:
     """A count with its noun."""
     return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.credible_sets import CredibleSet, credible_set
+from mlci.credible_sets import CredibleSet, counted, credible_set
 from mlci.crossings import ANY, Crossing
 from mlci.demonstrations import Demonstration
 from mlci.evidence import PAPER, Ranking, Rates, log_evidence, rank_constraints
@@ -236,8 +236,8 @@ class Inference:
         table = self.to_frame().head(rows).to_string(index=False, float_format="{:.3g}".format)
         return "\n".join(
             [
-                f"{len(self.names)} demonstrations, {len(self.hypotheses)} hypotheses; probability "
-                f"of no constraint {self.posterior_none:.3g}",
+                f"{counted(len(self.names), 'demonstration')}, {len(self.hypotheses)} hypotheses; "
+                f"probability of no constraint {self.posterior_none:.3g}",
                 table,
                 f"{100 * self.credible.share:g} % credible: {self.credible}",
                 *(f"warning: {warning}" for warning in self.warnings),

@@ -37,5 +37,7 @@ def default_results() -> Path:
 
 
 def results_folder(settings: HasResults) -> Path:
-    """Where results go: the usual folder unless the settings name another."""
-    return default_results() if settings.results is None else Path(settings.results).resolve()
+    """Where results go: the usual folder unless the settings name another; `~` is one's home."""
+    if settings.results is None:
+        return default_results()
+    return Path(settings.results).expanduser().resolve()

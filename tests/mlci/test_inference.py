@@ -167,6 +167,7 @@ def test_repr_and_summary_say_what_was_inferred_and_what_is_doubtful() -> None:
     many = Inference(
         HYPOTHESES, ("a",), np.ones((1, 100)), np.zeros((1, 100), bool), np.ones(1, bool)
     )
+    assert repr(many).startswith("1 demonstration, ")
     assert many.warnings == []
     assert [len(words.splitlines()) for words in (repr(many), many.summary())] == [8, 13]
 
