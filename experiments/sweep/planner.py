@@ -108,8 +108,8 @@ class Planner(Sweeper):
                 return
             from experiments.collate.join import collate  # pandas
 
-            for table in collate(points, folder, mixed=options.mix_sources):
-                print(f"written: {table}")
+            tables = collate(points, folder, mixed=options.mix_sources)
+            print(f"written: {counted(len(tables), 'table')} in {folder / 'tables'}")
 
     def _plan(self, jobs: Sequence[Sequence[str]]) -> tuple[list[PlannedPoint], StudySettings]:
         """Compose and check every point; of equal ones the first stays."""
