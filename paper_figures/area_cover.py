@@ -32,7 +32,8 @@ METHODS = {
 
 def shown_size(area_map: pd.DataFrame) -> int:
     """The number of demonstrations whose areas are drawn."""
-    sizes = [int(name.removeprefix("climb_")) for name in area_map if name.startswith("climb_")]
+    climbs = area_map.filter(regex="^climb_").dropna(axis="columns", how="all")
+    sizes = [int(name.removeprefix("climb_")) for name in climbs]
     return max((size for size in sizes if size <= SHOWN), default=min(sizes))
 
 

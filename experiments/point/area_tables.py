@@ -41,7 +41,7 @@ def area_tables(settings: Settings, point: PointInference) -> dict[str, pd.DataF
         `areas`, a row a subset of the demonstrations and `method`: how many `regions` it takes,
         and of their union `iou` with the truth, `precision` and `recall`, shares of volume.
         `area_map`, a row a hypothesis: its share `in_truth`; and for each number of demonstrations
-        the share of subsets in whose `climb` it is.
+        the share of subsets in whose `climb` it is, nan where there are fewer demonstrations.
     """
     inference = replace(
         point.inference,
@@ -85,7 +85,8 @@ def area_tables(settings: Settings, point: PointInference) -> dict[str, pd.DataF
                 }
                 for method, mask in found.items()
             ]
-    columns = {f"climb_{size}": share for size, share in shares.items()}
+    none = np.full(len(cells), np.nan)
+    columns = {f"climb_{size}": shares.get(size, none) for size in sorted(asked.demonstrations)}
     of_cells = {"hypothesis": np.arange(len(cells)), "in_truth": inside / (inside + outside)}
     return {"areas": pd.DataFrame(rows), "area_map": pd.DataFrame({**of_cells, **columns})}
 
