@@ -1,5 +1,7 @@
 """A real point that takes a tenth of a second, for tests of what is kept of points."""
 
+import gc
+import os
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -9,6 +11,17 @@ from tiny_point import TINY, composed
 
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
+
+# Bytecode is kept even where the environment says otherwise: dozens of processes that tests start
+# would each compile all modules again, for two seconds.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+
+def pytest_collection_finish() -> None:
+    """Garbage is looked for as seldom as in our commands, and not in what was collected."""
+    gc.set_threshold(50_000)
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

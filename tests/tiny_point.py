@@ -6,14 +6,16 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from hydra import compose, initialize_config_dir
+from hydra import initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from hydra.types import RunMode
 
 from experiments.app import version_base
 from experiments.config.command_line import quote_options
 from experiments.config.paths import CONF
-from experiments.config.read import plain_tree
 from experiments.config.settings import Settings
 from experiments.sweep import attempt
+from experiments.sweep.composer import Composer
 from experiments.sweep.plugins import register_plugins
 from experiments.tracking.points import Point
 from experiments.tracking.trees import plain
@@ -41,11 +43,17 @@ def composed(*overrides: str, name: str = "config") -> dict[str, Any]:
     return copy.deepcopy(_composed(*overrides, name=name))
 
 
-@functools.cache  # composing takes a tenth of a second, and most tests begin with the same config
+@functools.cache  # most tests begin with the same config
 def _composed(*overrides: str, name: str) -> dict[str, Any]:
+    return _composer(name).tree([quote_options(word) for word in overrides])
+
+
+@functools.cache  # Hydra takes a tenth of a second for each choice of groups
+def _composer(name: str) -> Composer:
     register_plugins()
     with initialize_config_dir(str(CONF), **version_base()):
-        return plain_tree(compose(name, [quote_options(word) for word in overrides]))
+        loader = GlobalHydra.instance().config_loader()
+        return Composer(loader, loader.load_configuration(name, [], RunMode.MULTIRUN))
 
 
 def planned(settings: Settings, results: Path) -> Point:

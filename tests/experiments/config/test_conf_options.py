@@ -6,7 +6,9 @@ from typing import Any
 import pytest
 import yaml
 from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.types import RunMode
 from omegaconf import OmegaConf
 
 from experiments.app import version_base
@@ -14,6 +16,7 @@ from experiments.config.command_line import quote_options
 from experiments.config.paths import CONF
 from experiments.config.read import plain_tree, read_config, read_recorded_config
 from experiments.sweep.combinations import Combinations
+from experiments.sweep.composer import Composer
 from experiments.sweep.plugins import register_plugins
 
 register_plugins()
@@ -85,12 +88,15 @@ def test_smoke_scale_touches_no_axis_and_no_system() -> None:
 def test_every_experiment_is_valid_and_small_at_smoke_scale(experiment: str) -> None:
     """Each value and each case makes a point that can run; `make stress` plans all combinations."""
     words = [experiment, "scale=smoke"]
-    sweeper = composed(*words).hydra.sweeper
-    combinations = Combinations(sweeper.params, sweeper.settings, sweeper.cases, sweeper.ends)
-    points = combinations.overrides(words, OverridesParser.create())
-    assert 2 <= len(points) <= 100
-    checked: set[str] = set()
-    for point in points:
-        if not checked.issuperset(point):
-            checked.update(point)
-            read_config(plain_tree(composed(*point)))
+    with initialize_config_dir(str(CONF), **version_base()):
+        loader = GlobalHydra.instance().config_loader()
+        base = loader.load_configuration("config", words, RunMode.MULTIRUN)
+        sweeper = base.hydra.sweeper
+        combinations = Combinations(sweeper.params, sweeper.settings, sweeper.cases, sweeper.ends)
+        points = combinations.overrides(words, OverridesParser.create())
+        assert 2 <= len(points) <= 100
+        composer, checked = Composer(loader, base), set[str]()
+        for point in points:
+            if not checked.issuperset(point):
+                checked.update(point)
+                read_config(composer.tree(point))
