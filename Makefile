@@ -1,6 +1,11 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
+
+# Bytecode is kept even where the environment says otherwise: a process that has to compile the
+# project's modules again takes two seconds longer to start, and each study starts several.
+export PYTHONDONTWRITEBYTECODE :=
+
 # The studies that the report needs, the longest first, and all others; the experiment `smoke` repeats
 # the paper's.
 STUDIES := telescope paper sensitivity readings calibration rule_breaking wrong_model \
@@ -10,6 +15,9 @@ OTHERS := $(filter-out $(STUDIES) smoke,$(basename $(notdir $(wildcard conf/expe
 # Two studies run at a time, each on half of the cores: while one plans its points, waits for what they
 # share or writes its tables, the other computes.
 HALF := $(shell echo $$(( ($$(getconf _NPROCESSORS_ONLN) + 1) / 2 )))
+
+# Each line of a study with its name, as another one runs beside it.
+SAY = (trap "" INT; awk "{ print \"$*: \" \$$0; fflush() }")
 
 .PHONY: help install paper studies figures report smoke test stress lint benchmark lock
 
@@ -24,8 +32,7 @@ paper: $(READY) ## run what is missing of the report's studies, draw their figur
 	@$(MAKE) --no-print-directory figures
 
 study-%: $(READY)
-	@bash -o pipefail -c '$(BIN)/python experiments/run.py -m experiment=$* workers=$(HALF) sweep.replace=true 2>&1 \
-		| (trap "" INT; awk "{ print \"$*: \" \$$0; fflush() }")'
+	@bash -o pipefail -c '$(BIN)/python experiments/run.py -m experiment=$* workers=$(HALF) sweep.replace=true 2>&1 | $(SAY)'
 
 studies: $(READY) ## run what is missing of all other studies, and draw their figures
 	@set -e; for each in $(OTHERS); do \
@@ -42,13 +49,14 @@ report: $(READY) ## write results/paper/REPORT.md and .html
 	$(BIN)/python -m paper_figures.report
 
 smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
-	@set -e; for each in $(STUDIES) $(OTHERS); do \
-		echo "=== study $$each"; \
-		$(BIN)/python experiments/run.py -m experiment=$$each scale=smoke study=$$each \
-			sweep.replace=true results=$(CURDIR)/results/smoke; \
-	done
+	@$(MAKE) --no-print-directory --jobs=2 $(patsubst %,smoke-%,$(STUDIES) $(OTHERS))
 	$(BIN)/python -m paper_figures --results results/smoke $(STUDIES) $(OTHERS)
 	$(BIN)/python -m paper_figures.report --results results/smoke
+
+# One worker each: to start another takes longer than its share of such points.
+smoke-%: $(READY)
+	@bash -o pipefail -c '$(BIN)/python experiments/run.py -m experiment=$* scale=smoke study=$* workers=1 \
+		sweep.replace=true results=$(CURDIR)/results/smoke 2>&1 | $(SAY)'
 
 test: $(READY) ## run the tests, on all cores
 	$(BIN)/python -m pytest -n logical --dist worksteal
