@@ -29,9 +29,10 @@ V       values                safe set's value function                  unit of
 
 from typing import TYPE_CHECKING, Any
 
+from mlci.actuation.inference import ControlInference, calibrate_controls, infer_controls
+from mlci.actuation.predicates import ControlPredicates
+from mlci.actuation.ranges import ControlRanges
 from mlci.calibration import Calibration, calibrate
-from mlci.control_inference import ControlInference, infer_controls
-from mlci.control_ranges import ControlRanges
 from mlci.crossings import Crossing
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
@@ -86,6 +87,7 @@ __all__ = [
     "Calibration",
     "CausalEntropy",
     "ControlInference",
+    "ControlPredicates",
     "ControlRanges",
     "Crossing",
     "Demonstration",
@@ -126,6 +128,7 @@ __all__ = [
     "WeightEstimate",
     "action_grid",
     "calibrate",
+    "calibrate_controls",
     "check_affine",
     "check_system",
     "demonstrate",

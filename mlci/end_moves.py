@@ -19,8 +19,9 @@ from mlci.simulate import rollout
 from mlci.spaces import Box, Floats, Ints
 from mlci.tabular import TabularModel
 
-# Of L moves: the cell (L,) that each begins in, its reward (L,) [nat] and its path (L, K+1, n).
-MovePaths = tuple[Ints, Floats, Floats]
+# Of L moves: the cell (L,) that each begins in, its action (L,), its reward (L,) [nat] and its path
+# (L, K+1, n).
+MovePaths = tuple[Ints, Ints, Floats, Floats]
 
 
 def first_moves(model: TabularModel, start: Floats) -> MergedMoves:
@@ -43,7 +44,8 @@ def first_paths(model: TabularModel, start: Floats) -> MovePaths:
     origin = np.broadcast_to(start, (len(model.actions), len(start)))
     path = rollout(model.system, origin, model.actions[:, None, :], model.dt, model.substeps)
     cell = np.full(len(origin), model.grid.index(start))
-    return cell, model.move_reward(origin, model.actions), path
+    reward = model.move_reward(origin, model.actions)
+    return cell, np.arange(len(origin)), reward, path
 
 
 def last_paths(
@@ -54,16 +56,17 @@ def last_paths(
         # Whether the truth allows a move is seen on the bent path.
         moves = model.moves_of(block)
         row, move = np.nonzero(np.isin(moves.successor, goal_cells))
-        origin, action = model.move_origins(block[row], move), model.actions[model.action[move]]
-        path = rollout(model.system, origin, action[:, None, :], model.dt, model.substeps)
-        yield block[row], moves.reward[row, move], _bent(model, path, goal)
+        origin, action = model.move_origins(block[row], move), model.action[move]
+        applied = model.actions[action][:, None, :]
+        path = rollout(model.system, origin, applied, model.dt, model.substeps)
+        yield block[row], action, moves.reward[row, move], _bent(model, path, goal)
 
 
 def only_paths(model: TabularModel, start: Floats, goal_cells: Ints, goal: Box) -> MovePaths:
     """The paths of `only_moves`."""
-    cell, reward, path = first_paths(model, start)
+    cell, action, reward, path = first_paths(model, start)
     into = np.isin(model.grid.index(path[:, -1]), goal_cells)
-    return cell[into], reward[into], _bent(model, path[into], goal)
+    return cell[into], action[into], reward[into], _bent(model, path[into], goal)
 
 
 def _bent(model: TabularModel, path: Floats, goal: Box) -> Floats:
@@ -80,7 +83,7 @@ def allowed_moves(model: TabularModel, parts: Iterable[MovePaths]) -> MergedMove
     None is merged with another.
     """
     followed = [
-        (cell, reward, *follow(model.grid, model.regions, path)) for cell, reward, path in parts
+        (cell, reward, *follow(model.grid, model.regions, path)) for cell, _, reward, path in parts
     ]
     cell, reward, successor = (np.concatenate([part[i] for part in followed]) for i in range(3))
     crosses = scipy.sparse.vstack([part[3] for part in followed], format="csr")

@@ -17,6 +17,7 @@ PACKAGES = ("mlci", "experiments", "paper_figures")
 # A module of mlci, and what stands directly below it. It may import that, and all that is below
 # that. A package's name stands for its modules, which may import each other.
 MLCI = {
+    "mlci.actuation": "",
     "mlci.control": "",
     "mlci.safety": "",
     "mlci.sampled": "",
@@ -115,8 +116,11 @@ MLCI = {
     "mlci.rank_errors": "mlci.preparation",
     "mlci.calibration": "mlci.forecast_scores mlci.demonstrator mlci.preparation",
     "mlci.inverse_dynamics": "mlci.demonstrations mlci.simulate",
-    "mlci.control_ranges": "mlci.inverse_dynamics",
-    "mlci.control_inference": "mlci.control_ranges mlci.maxent mlci.evidence",
+    "mlci.actuation.hypotheses": "mlci.inverse_dynamics",
+    "mlci.actuation.ranges": "mlci.actuation.hypotheses",
+    "mlci.actuation.predicates": "mlci.actuation.hypotheses",
+    "mlci.actuation.moves": "mlci.actuation.hypotheses mlci.maxent",
+    "mlci.actuation.inference": "mlci.actuation.moves mlci.evidence mlci.forecasts",
     "mlci.temperature": "mlci.inference mlci.inverse_dynamics mlci.maxent",
     "mlci.soft.time_inside": "mlci.crossings mlci.tabular",
     "mlci.ties": "mlci.inference mlci.tabular",

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from mlci.demonstrations import Demonstration
-from mlci.inverse_dynamics import controls_along
+from mlci.actuation.hypotheses import ControlHypotheses
 from mlci.spaces import Bools, Box, Floats
 from mlci.systems import System
 
 
 @dataclass(frozen=True, eq=False)
-class ControlRanges:
+class ControlRanges(ControlHypotheses):
     """C ranges of m controls; they may overlap.
 
     Attributes:
@@ -35,6 +34,7 @@ class ControlRanges:
     lower: Floats
     upper: Floats
     names: tuple[str, ...] = ()
+    uses_states: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
@@ -83,13 +83,17 @@ class ControlRanges:
         m = box.dimension
         return cls(np.reshape(lower, (-1, m)), np.reshape(upper, (-1, m)), tuple(names))
 
-    def __len__(self) -> int:
-        return len(self.lower)
+    def check(self, system: System) -> None:
+        """See `ControlHypotheses.check`: they are ranges of as many controls as it has."""
+        controls = system.control_box.dimension
+        if self.lower.shape[1] != controls:
+            raise ValueError(
+                f"ranges of {self.lower.shape[1]} controls do not fit actions of {controls}"
+            )
 
-    def holds(self, controls: ArrayLike, tolerance: Floats | float = 0.0) -> Bools:
-        """Whether controls (..., m) lie in each range (..., C), by more than a tolerance (m,)."""
-        controls = np.asarray(controls, dtype=float)[..., None, :]
-        inside = (controls > self.lower + tolerance) & (controls < self.upper - tolerance)
+    def holds(self, states: Floats, controls: Floats) -> Bools:
+        """See `ControlHypotheses.holds`; states do not matter."""
+        inside = (controls[..., None, :] > self.lower) & (controls[..., None, :] < self.upper)
         return np.asarray(np.all(inside, axis=-1))
 
     def left_of(self, box: Box, index: int) -> Box:
@@ -111,43 +115,3 @@ class ControlRanges:
             f"range {self.names[index]} leaves no box of the controls {box}: it must cut off one "
             "end of one control"
         )
-
-    def applied_by(
-        self,
-        system: System,
-        demonstration: Demonstration,
-        window: float,
-        tolerance: Floats | float = 0.0,
-    ) -> Bools:
-        """(C,) which ranges a demonstration applies controls of.
-
-        Its recorded controls count, or else those of `mlci.inverse_dynamics.controls_along`; means
-        over windows of time, as noise of the states makes spikes of controls.
-
-        Args:
-            system: the dynamics.
-            demonstration: the path.
-            window: length of the windows [s], such as the time step of a tabular model.
-            tolerance: how far into a range a mean must be (m,), in the units of the controls.
-
-        Raises:
-            ValueError: a window that is not positive, or longer than the demonstration.
-        """
-        times, controls = demonstration.times, demonstration.controls
-        if not 0 < window <= times[-1] * (1 + 1e-9):
-            raise ValueError(
-                f"a window must be positive and at most {times[-1]:g} s, as long as the "
-                f"demonstration, not {window:g} s"
-            )
-        if controls is None:
-            controls = controls_along(system, demonstration.states, times)
-        effects = np.vstack([np.zeros(controls.shape[1]), controls * np.diff(times)[:, None]])
-        total = np.cumsum(effects, axis=0)
-        # A mean is linear in when its window begins, but where an end passes a sample.
-        begins = np.union1d(times, times - window)
-        begins = begins[(begins >= 0) & (begins <= times[-1] - window * (1 - 1e-9))]
-        until, since = (
-            np.column_stack([np.interp(at, times, column) for column in total.T])
-            for at in (begins + window, begins)
-        )
-        return np.asarray(np.any(self.holds((until - since) / window, tolerance), axis=0))

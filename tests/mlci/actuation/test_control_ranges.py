@@ -8,17 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlci.control_inference import control_avoidance, infer_controls, without
-from mlci.control_ranges import ControlRanges
+from mlci.actuation.inference import infer_controls
+from mlci.actuation.moves import ControlledMoves
+from mlci.actuation.ranges import ControlRanges
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.evidence import DEFAULT_MODEL_ERROR, Rates
 from mlci.grids import Grid
+from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
 from mlci.simulate import rollout
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator, FunctionSystem
-from mlci.tabular import action_grid, discretize
+from mlci.tabular import TabularModel, action_grid, discretize
 
 LINE = StateSpace(Box([0.0], [5.0]), [False], ("x",))
 WALKER = FunctionSystem(lambda x, u: (u[..., 0],), LINE, Box([-1.0], [1.0]))
@@ -27,13 +29,17 @@ FAST = ControlRanges(
     [[0.5], [-np.inf], [-np.inf]], [[np.inf], [-0.5], [0.5]], ("up", "down", "slow")
 )
 CART = DoubleIntegrator()
+RANGES = ControlRanges.beyond(CART, [0.25, 0.5, 0.75])
+LIMIT = float(CART.control_box.upper[0])
 
 
 def test_alpha_is_the_share_of_trajectories_that_take_no_such_action() -> None:
     actions = np.array([[-1.0], [0.0], [1.0]])
     model = discretize(WALKER, Grid(LINE, (5,)), actions, 1.0, NO_REGIONS)
     task = Task(np.array([2.5]), Box([3.0], [4.0]), 4.0)
-    held = FAST.holds(actions)
+    moves = ControlledMoves.of(model, FAST)
+    np.testing.assert_allclose(moves.shares, [1 / 3, 1 / 3, 2 / 3])
+    held = FAST.holds(np.zeros((3, 1)), actions)
     weights, avoiding = 0.0, np.zeros(3)
     for sequence in itertools.product(range(3), repeat=4):
         positions = 2.5 + np.cumsum(actions[list(sequence), 0])
@@ -42,26 +48,37 @@ def test_alpha_is_the_share_of_trajectories_that_take_no_such_action() -> None:
             weights += weight
             avoiding += weight * ~np.any(held[list(sequence)], axis=0)
     for exact_ends in (False, True):
-        alpha = control_avoidance(model, [task], held, exact_ends=exact_ends)
+        alpha = moves.avoidance([task], exact_ends=exact_ends)
         # Without "up" nobody gets up; "slow" holds all that does not.
         np.testing.assert_allclose(alpha[0], avoiding / weights, atol=1e-12)
     assert alpha[0, 0] == 0
     assert 0 < alpha[0, 1] < 1
 
 
-def test_what_is_left_moves_as_before() -> None:
-    actions = action_grid(CART, 5)
-    regions = Regions.from_grid(CART.space, (3, 3))
-    model = discretize(CART, Grid(CART.space, (6, 6)), actions, 0.5, regions, samples=2)
-    mask = np.array([True, False, False, True, False])
-    smaller = without(model, mask)
-    moves = np.flatnonzero(~mask[model.action])
-    cells = np.arange(36)
-    every, some = model.moves_of(cells), smaller.moves_of(cells)
-    np.testing.assert_array_equal(some.successor, every.successor[:, moves])
-    rows = every.crosses.toarray().reshape(36, model.moves, -1)[:, moves]
-    np.testing.assert_array_equal(some.crosses.toarray().reshape(36, len(moves), -1), rows)
-    assert smaller.moves == len(moves)
+@pytest.mark.parametrize("exact_ends", [False, True])
+@pytest.mark.parametrize("samples", [1, 2])
+def test_alpha_is_the_ratio_of_partition_functions(exact_ends: bool, samples: int) -> None:
+    """alpha = Z_i / Z, with Z_i of a model that lacks the actions; one step, and several."""
+    regions = Regions.from_boxes(CART.space, [Box([-1.0, -0.5], [-0.5, 0.5])])
+    ranges = ControlRanges([[0.3 * LIMIT], [-np.inf]], [[np.inf], [-0.7 * LIMIT]])
+    grid, actions = Grid(CART.space, (12, 12)), action_grid(CART, 5)
+    model = discretize(CART, grid, actions, 0.5, regions, samples=samples).under([True])
+    goal = Box([-0.5, -0.5], [0.5, 0.5])
+    tasks = [Task(np.array([-0.2, 0.4]), goal, 0.5 * steps) for steps in (1, 2, 4)]
+    alpha = ControlledMoves.of(model, ranges).avoidance(tasks, exact_ends=exact_ends)
+    log_z = np.array([_log_z(model, task, exact_ends) for task in tasks])
+    assert np.all(log_z > -np.inf)
+    for i in range(2):
+        some = actions[~ranges.holds(np.zeros((5, 2)), actions)[:, i]]
+        fewer = discretize(CART, grid, some, 0.5, regions, samples=samples).under([True])
+        vars(fewer)["substeps"] = model.substeps
+        ratio = np.exp([_log_z(fewer, task, exact_ends) for task in tasks] - log_z)
+        np.testing.assert_allclose(alpha[:, i], ratio, rtol=1e-9)
+
+
+def _log_z(model: TabularModel, task: Task, exact_ends: bool) -> float:
+    way = TrajectoryDistribution.of_task(model, task, exact_ends=exact_ends)
+    return float(way.log_z[0, way.start])
 
 
 def cart_path(controls: list[float], hold: int = 50, dt: float = 0.01) -> Demonstration:
@@ -74,10 +91,6 @@ def cart_path(controls: list[float], hold: int = 50, dt: float = 0.01) -> Demons
         applied,
         np.arange(len(states)) * dt,
     )
-
-
-RANGES = ControlRanges.beyond(CART, [0.25, 0.5, 0.75])
-LIMIT = float(CART.control_box.upper[0])
 
 
 def test_recorded_and_reconstructed_controls_tell_the_same() -> None:
@@ -155,7 +168,7 @@ def test_a_joint_that_will_not_push_is_found() -> None:
     assert inference.ranking.order[0] == 0
     assert inference.ranking.gain[0] > 0
     table = inference.to_frame()
-    assert table["range"][0] == ranges.names[0]
+    assert table["name"][0] == ranges.names[0]
     assert table["applied_by"][0] == 0
 
 
@@ -181,9 +194,9 @@ def test_options_reach_the_probabilities_and_the_evidence(exact_ends: bool) -> N
         model, [path], RANGES, tolerance=0.2 * LIMIT, exact_ends=exact_ends, round_horizon=True
     )
     three = replace(path.task, horizon=1.5)
+    moves = ControlledMoves.of(model, RANGES)
     alpha, other = (
-        control_avoidance(model, [three], RANGES.holds(actions), exact_ends=ends)
-        for ends in (exact_ends, not exact_ends)
+        moves.avoidance([three], exact_ends=ends) for ends in (exact_ends, not exact_ends)
     )
     np.testing.assert_allclose(inference.avoidance, alpha, atol=1e-12)
     assert np.max(np.abs(alpha - other)) > 0.01
@@ -216,7 +229,7 @@ def test_ranges_that_a_model_cannot_tell_are_refused() -> None:
     regions = Regions.from_boxes(CART.space, [])
     model = discretize(CART, Grid(CART.space, (6, 6)), action_grid(CART, 3), 0.5, regions)
     narrow = ControlRanges([[0.2 * LIMIT]], [[0.4 * LIMIT]])
-    with pytest.raises(ValueError, match="range 0 holds none of the model's 3 actions"):
+    with pytest.raises(ValueError, match="0 forbids none of the model's moves, of 3 actions"):
         infer_controls(model, [], narrow)
     with pytest.raises(ValueError, match="ranges of 2 controls do not fit actions of 1"):
         infer_controls(model, [], ControlRanges([[0.0, 0.0]], [[1.0, 1.0]]))

@@ -1,0 +1,1 @@
+"""Hypotheses about controls: what somebody may be unable, or unwilling, to apply."""

@@ -1,0 +1,141 @@
+"""The moves of a tabular model, told apart by the hypotheses about controls that forbid them.
+
+The tabular agent keeps to a hypothesis if it takes none of the moves that this forbids, so that the
+probability of that is alpha, as for moves that cross a region: the recursion of
+`mlci.recursions.backward_pass` with hypotheses in place of regions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy  # loads scipy.sparse when it is first used
+
+from mlci.actuation.hypotheses import ControlHypotheses
+from mlci.demonstrations import Task
+from mlci.end_moves import MovePaths, allowed_moves, first_paths, last_paths, only_paths
+from mlci.maxent import TrajectoryDistribution
+from mlci.merged_moves import MergedMoves, joined, merge_moves
+from mlci.recursions import Leg, backward_pass
+from mlci.simulate import rollout
+from mlci.single_moves import SingleMoves
+from mlci.spaces import Bools, Floats, Ints
+from mlci.tabular import TabularModel
+
+
+@dataclass(frozen=True, eq=False)
+class ControlledMoves:
+    """The moves of a tabular model by which of C hypotheses forbid them; made by `of`.
+
+    Attributes:
+        model: the tabular model.
+        hypotheses: the C hypotheses.
+        moves: its moves, merged where successor and hypotheses are the same; these stand in the
+            place of regions.
+        shares: (C,) share of all moves that each hypothesis forbids.
+    """
+
+    model: TabularModel
+    hypotheses: ControlHypotheses
+    moves: MergedMoves
+    shares: Floats
+
+    @classmethod
+    def of(cls, model: TabularModel, hypotheses: ControlHypotheses) -> ControlledMoves:
+        """Look at every move of a model.
+
+        Raises:
+            TypeError: a model without cells.
+            ValueError: hypotheses about another system, or one that forbids no move, so that the
+                model cannot tell.
+        """
+        if not hasattr(model, "grid"):
+            raise TypeError(f"this needs a TabularModel; a {type(model).__name__} has no cells")
+        hypotheses.check(model.system)
+        count, parts = np.zeros(len(hypotheses)), []
+        for cells in model.blocks():
+            block = _labelled(model, hypotheses, cells)
+            count += block.crosses.sum(axis=0).A1
+            parts.append(merge_moves([block]))
+        moves, known = joined(parts), model.explored
+        cells_known = model.states if known is None else int(np.sum(known.cells))
+        if known is not None:
+            moves = moves.placed(np.flatnonzero(known.cells), model.states)
+        for i in np.flatnonzero(count == 0):
+            raise ValueError(
+                f"{hypotheses.names[i]} forbids none of the model's moves, of {len(model.actions)} "
+                "actions, so that the model cannot tell: take more actions, or a wider range"
+            )
+        return cls(model, hypotheses, moves, count / (cells_known * model.moves))
+
+    def avoidance(
+        self, tasks: Sequence[Task], *, exact_ends: bool = True, round_horizon: bool = False
+    ) -> Floats:
+        """alpha (N, C): probability of no move that a hypothesis forbids; 1 where a task cannot be
+        done.
+
+        Args:
+            tasks: the N tasks.
+            exact_ends: as of `mlci.infer`.
+            round_horizon: likewise.
+        """
+        alpha = np.ones((len(tasks), len(self.hypotheses)))
+        for row, task in zip(alpha, tasks, strict=True):
+            way = TrajectoryDistribution.of_task(
+                self.model, task, round_horizon=round_horizon, exact_ends=exact_ends
+            )
+            if way.is_possible:
+                legs = self._legs(way)
+                row[:] = backward_pass(legs, way.reachable, way.goal, way.start, len(row))[1]
+        return alpha
+
+    def _legs(self, way: TrajectoryDistribution) -> list[Leg]:
+        """The moves of each part of the way of a task."""
+        ends, last = way.ends, way.steps - 1
+        if ends is None:
+            return [(self.moves, 0, way.steps)]
+        of_goal = way.goal, ends.goal
+        if last == 0:
+            return [(self._to_states([only_paths(self.model, ends.start, *of_goal)]), 0, 1)]
+        first = self._to_states([first_paths(self.model, ends.start)])
+        cells = np.flatnonzero(way.reachable[-2])
+        goal = self._to_states(list(last_paths(self.model, cells, *of_goal)))
+        return [(first, 0, 1), (self.moves, 1, last), (goal, last, last + 1)]
+
+    def _to_states(self, parts: Sequence[MovePaths]) -> MergedMoves:
+        """Moves from or to states; none is merged with another."""
+        held = np.concatenate([self._of_paths(action, path) for _, action, _, path in parts])
+        crosses = scipy.sparse.csr_matrix(held)
+        return replace(
+            allowed_moves(self.model, parts),
+            crossing_begins=crosses.indptr.astype(np.int64),
+            crossing_region=crosses.indices.astype(np.int32),
+        )
+
+    def _of_paths(self, action: Ints, path: Floats) -> Bools:
+        """(L, C) which hypotheses forbid moves by their actions (L,) and paths (L, K+1, n)."""
+        middles = self.model.system.space.wrap(_middle(path))
+        return self.hypotheses.holds(middles, self.model.actions[action])
+
+
+def _labelled(model: TabularModel, hypotheses: ControlHypotheses, cells: Ints) -> SingleMoves:
+    """The moves of some cells, with the hypotheses that forbid them in the place of regions."""
+    single = model.moves_of(cells)
+    origins = model.move_origins(
+        np.repeat(cells, model.moves), np.tile(np.arange(model.moves), len(cells))
+    )
+    controls = np.tile(model.actions[model.action], (len(cells), 1))
+    if hypotheses.uses_states:
+        path = rollout(model.system, origins, controls[:, None, :], model.dt, model.substeps)
+        origins = model.system.space.wrap(_middle(path))
+    held = hypotheses.holds(origins, controls)
+    successor = np.where(single.allowed(model.truth), single.successor, -1)
+    return SingleMoves(successor, single.reward, scipy.sparse.csr_matrix(held))
+
+
+def _middle(path: Floats) -> Floats:
+    """(L, n) the states in the middle of paths (L, K+1, n) of even times."""
+    last = path.shape[1] - 1
+    return (path[:, last // 2] + path[:, (last + 1) // 2]) / 2
