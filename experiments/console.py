@@ -12,10 +12,10 @@ from mlci.answers import Answer, listed
 from mlci.demonstrations import Task
 from mlci.diagnosis import Diagnosis
 from mlci.inference import Inference
-from mlci.sets.posterior import SetPosterior
+from mlci.recordings.plausibility import Plausibility
 from mlci.spaces import Box, StateSpace
 
-_AREAS, _CARRIERS, _MARGINALS = 3, 4, 5  # that are printed
+_AREAS, _CARRIERS = 3, 4  # that are printed
 NEXT_ASSUMED = (
     "as far as at most one region is forbidden, and people move like the tabular model; to tell "
     "something is to move a tenth of the probability"
@@ -58,6 +58,14 @@ def noise_words(diagnosis: Diagnosis) -> str:
     return ", ".join(f"{noise:.3g} of {free:.3g}" for noise, free in pairs)
 
 
+def doubt_lines(checks: Sequence[Plausibility]) -> list[str]:
+    """A paragraph for each recording that is doubtful, and how many are not."""
+    doubtful = [check for check in checks if check.doubts]
+    lines = [line for check in doubtful for line in entry("doubtful", str(check), hang=2)]
+    good = len(checks) - len(doubtful)
+    return lines + entry("recordings", f"{good} of {len(checks)} are plausible")
+
+
 def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) -> Iterator[str]:
     """The answer first, then what it assumes, what it rests on, and what is doubtful.
 
@@ -89,25 +97,6 @@ def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) 
     yield from _next_lines(answer)
     for warning in answer.warnings:
         yield from entry("warning", warning)
-
-
-def set_lines(sets: SetPosterior | None, names: Sequence[str]) -> Iterator[str]:
-    """The most probable set, the regions that are most probably forbidden, and how sure that is."""
-    if sets is None:
-        return
-    best, marginal = sets.most_probable(), sets.marginal
-    first = np.argsort(-marginal, kind="stable")[:_MARGINALS]
-    likely = ", ".join(f"{names[i]} {probability(marginal[i])}" for i in first)
-    members = f"is that of {listed([names[i] for i in best])}" if best else "forbids nothing"
-    yield from entry(
-        "sets",
-        f"the most probable set {members}, with probability "
-        f"{probability(sets.probability_of(best))}; forbidden, alone or with others: {likely}",
-    )
-    if sets.check is not None:
-        yield from entry("", str(sets.check))
-        if not sets.check.agrees:
-            yield from entry("warning", "chains over sets disagree: raise inference.sets.steps")
 
 
 def refutation_lines(inference: Inference) -> list[str]:

@@ -18,12 +18,15 @@ import numpy as np
 import mlci.preparation
 from experiments import infer_table
 from experiments.app import DONE, FAILED, run_command
+from experiments.belief_lines import control_lines, set_lines
 from experiments.config.paths import results_folder
 from experiments.config.read import read_recorded_config, writable_results
 from experiments.config.settings import ESTIMATE, RecordedSettings
-from experiments.console import answer_lines, diagnosis_lines, refutation_lines, set_lines
+from experiments.console import answer_lines, diagnosis_lines, doubt_lines, refutation_lines
 from experiments.lookback.recordings import CALIBRATION
+from experiments.page.beliefs import belief_sentences
 from experiments.page.document import page
+from experiments.point.controls import control_record, recorded_controls
 from experiments.point.forecasts import exported_calibration, recorded_calibration
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import (
@@ -42,6 +45,7 @@ from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, json_bytes, replace_file
 from experiments.tracking.store import Store
 from experiments.tracking.trees import canonical_json, plain
+from mlci.actuation.inference import ControlInference
 from mlci.answers import Answer, answer
 from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
@@ -101,7 +105,7 @@ def infer(settings: RecordedSettings) -> int:
         return FAILED
     results = writable_results(settings)
     checks = plausibilities(settings, demonstrations)
-    say(_doubt_lines(checks))
+    say(doubt_lines(checks))
     begin("forming the tabular model")
     model = discretized_model(settings, settings.candidates)
     if settings.inference.calibrate and calibration is None:
@@ -110,19 +114,22 @@ def infer(settings: RecordedSettings) -> int:
     result = _answer(settings, model, demonstrations, calibration, summary(checks))
     begin("weighing sets of hypotheses")
     sets = set_belief(settings, model, demonstrations, result.inference, np.random.default_rng(0))
+    controls = recorded_controls(settings, model, demonstrations)
     begin("drawing the map")
     # All is saved before it is printed, in case nobody reads on.
-    folder = _save(settings, demonstrations, problems, result, checks, sets)
+    folder = _save(settings, demonstrations, problems, result, checks, sets, controls)
     diagnosis, count = diagnose(model), len(demonstrations)
     unreachable = int(np.sum(~result.inference.reachable))
     doubtful = [check for check in checks if check.doubts]
     concerns = list(diagnosis.concerns(space.names, unreachable, count))
-    content = _page(settings, readings, result, calibration, doubtful, concerns)
+    beliefs = belief_sentences(sets, result.inference.hypotheses.names, controls)
+    content = _page(settings, readings, result, calibration, doubtful, concerns, beliefs)
     replace_file(folder / "page.html", content)
     begin("")
     for line in (
         *_answer_lines(settings, result, calibration),
         *set_lines(sets, result.inference.hypotheses.names),
+        *control_lines(controls, settings.top),
         f"demonstrations  {count} used, {counted(len(problems), 'file')} not used",
         *refutation_lines(result.inference),
         *diagnosis_lines(diagnosis, space.names, unreachable, count),
@@ -202,14 +209,6 @@ def _answer_lines(
     return lines
 
 
-def _doubt_lines(checks: Sequence[Plausibility]) -> list[str]:
-    """A paragraph for each recording that is doubtful, and how many are not."""
-    doubtful = [check for check in checks if check.doubts]
-    lines = [line for check in doubtful for line in entry("doubtful", str(check), hang=2)]
-    good = len(checks) - len(doubtful)
-    return lines + entry("recordings", f"{good} of {len(checks)} are plausible")
-
-
 def _save(
     settings: RecordedSettings,
     demonstrations: Sequence[Demonstration],
@@ -217,6 +216,7 @@ def _save(
     result: Answer,
     checks: Sequence[Plausibility],
     sets: SetPosterior | None,
+    controls: ControlInference | None,
 ) -> Path:
     """Write tables, map and record into a folder of their own, named by what went in."""
     space, inference = settings.model.space, result.inference
@@ -234,12 +234,15 @@ def _save(
         "hypotheses": ranking_table(inference),
         **demonstration_tables(demonstrations, inference),
     }
+    if controls is not None:
+        tables["controls"] = controls.to_frame()
     for name, table in tables.items():
         replace_file(folder / f"{name}.csv", csv_bytes(table))
     replace_file(folder / "map.png", _map(inference, demonstrations))
     answer_record = {
         **result.record(),
         "sets": None if sets is None else set_record(sets, inference.hypotheses.names),
+        "controls": None if controls is None else control_record(controls),
         "recordings": [each.record(space) for each in checks],
     }
     replace_file(folder / "answer.json", json_bytes(answer_record))
@@ -267,6 +270,7 @@ def _page(
     calibration: Calibration | None,
     doubtful: Sequence[Plausibility],
     concerns: Sequence[str],
+    beliefs: Sequence[str],
 ) -> bytes:
     """The page, with what reading the files assumed and all that is doubtful."""
     given = settings.demonstrations
@@ -275,6 +279,7 @@ def _page(
         result,
         readings.demonstrations,
         title=f"What was avoided: {', '.join(sources)}",
+        beliefs=beliefs,
         assumed=[
             *together(readings.notes),
             *([] if calibration is None else [calibration.summary()]),

@@ -114,7 +114,8 @@ MLCI = {
     "mlci.models": "mlci.evidence mlci.maxent mlci.sampled.distribution mlci.sampling_errors",
     "mlci.preparation": "mlci.inference mlci.models",
     "mlci.rank_errors": "mlci.preparation",
-    "mlci.calibration": "mlci.forecast_scores mlci.demonstrator mlci.preparation",
+    "mlci.similar_tasks": "mlci.demonstrator mlci.tabular",
+    "mlci.calibration": "mlci.forecast_scores mlci.similar_tasks mlci.preparation",
     "mlci.inverse_dynamics": "mlci.demonstrations mlci.simulate",
     "mlci.actuation.hypotheses": "mlci.inverse_dynamics",
     "mlci.actuation.ranges": "mlci.actuation.hypotheses",
@@ -154,12 +155,14 @@ ROOMS = {
     "experiments.config": f"mlci {TRACKING} experiments.terminal",
     "experiments.terminal": "",
     "experiments.console": "mlci experiments.terminal",
-    "experiments.point": f"{POINT} experiments.console experiments.terminal",
+    "experiments.belief_lines": "mlci experiments.console experiments.terminal",
+    "experiments.point": f"{POINT} experiments.console experiments.terminal "
+    "experiments.belief_lines",
     "experiments.collate": f"{TRACKING} experiments.terminal",
     "experiments.sweep": f"{POINT} experiments.terminal experiments.point experiments.collate",
     "experiments.lookback": f"mlci {TRACKING} experiments.collate experiments.config.paths "
     "experiments.config.suggestions experiments.terminal",
-    "experiments.page": "mlci experiments.console experiments.terminal",
+    "experiments.page": "mlci experiments.belief_lines experiments.console experiments.terminal",
     "experiments.page.of_point": f"{POINT} experiments.console experiments.point experiments.page "
     "experiments.lookback",
     "paper_figures": f"mlci.regions {TRACKING} experiments.config.paths",

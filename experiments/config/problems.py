@@ -47,6 +47,8 @@ _EXAMPLES = {
     "upper: [3.2, 0.1]}",
     "BallSettings": "is not a ball; write its centre and semi-axes, such as {center: [3.1, 0.0], "
     "radii: [0.2, 0.5]}",
+    "ControlRange": "is not a range of controls; write its ends, null where there is none, such as "
+    "{lower: [1.0], upper: [null]}",
     "HalfSpaceSettings": "is not a half-space; write {normal: [0.0, 1.0], offset: 0.5} for what "
     "is above 0.5 in the second dimension",
 }

@@ -17,6 +17,10 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from omegaconf.resolvers import oc
 
+from experiments.config.control_checks import (
+    control_hypothesis_problems,
+    control_truth_problems,
+)
 from experiments.config.number_checks import (
     advice_count_problems,
     budget_problems,
@@ -81,7 +85,8 @@ def read_config(tree: Mapping[str, Any]) -> tuple[Settings, StudySettings]:
     _refuse(study_problems(study), count_problems(settings))
     _refuse(shape_problems(settings), point_shape_problems(settings), truth_problems(settings))
     _refuse(size_problems(settings))
-    _refuse(hypothesis_problems(settings))
+    _refuse(hypothesis_problems(settings), control_truth_problems(settings))
+    _refuse(control_hypothesis_problems(settings))
     _refuse(safe_set_problems(settings))
     return settings, study
 
@@ -121,6 +126,7 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
             used["next_tasks"] = {**chosen, "box": {"goal": None, **_without(box, ("crossing",))}}
     settings = checked(RecordedSettings, used)
     _refuse(shape_problems(settings), recorded_shape_problems(settings))
+    _refuse(control_hypothesis_problems(settings))
     _refuse(size_problems(settings), soft_problems(settings))
     return settings
 

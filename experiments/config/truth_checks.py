@@ -28,24 +28,25 @@ def truth_problems(settings: Settings) -> Iterator[str]:
             f"truth.name: {truth.name!r} cannot be part of a file's name; use letters, digits, "
             "- and _"
         )
-    if settings.tasks.crossing and truth.name == NO_TRUTH:
+    no_regions = not truth.count and truth.cell is None
+    if settings.tasks.crossing and no_regions:
         yield "tasks.crossing: true, but no truth is there to cross; set it to false"
     if settings.demonstrations.rule_breaking and truth.name == NO_TRUTH:
         yield (
             f"demonstrations.rule_breaking: {settings.demonstrations.rule_breaking}, but no truth "
             "is there to break; set it to 0"
         )
-    nothing = not truth.count and truth.cell is None
+    nothing = no_regions and not truth.controls
     if nothing and truth.name != NO_TRUTH:
         yield (
             "truth.boxes: [] is empty; give at least one box, with lower and upper, or another "
-            f"region, or a cell, or choose truth={NO_TRUTH}"
+            f"region, a cell or controls, or choose truth={NO_TRUTH}"
         )
     if truth.name == NO_TRUTH and not nothing:
         yield f"truth.name: {NO_TRUTH} means that nothing is forbidden; take another name"
     if truth.cell is not None and truth.count:
         yield f"truth.cell: {truth.cell} and {truth.count} regions are given; keep one of them"
-    if calibration.sets and truth.count:
+    if calibration.sets and (truth.count or truth.controls):
         yield (
             f"calibration.sets: {calibration.sets}, but the prior knows no such truth; take "
             "truth=none or truth=cell, or 0 sets"
@@ -55,14 +56,15 @@ def truth_problems(settings: Settings) -> Iterator[str]:
             f"calibration.sets: {calibration.sets}, but truths are drawn as equally probable, not "
             f"by inference.size_prior={settings.inference.size_prior:g}; set that to 0, or 0 sets"
         )
-    yield from _questions_without_truth(settings)
+    if no_regions:
+        yield from _questions_without_regions(settings)
     for i, region in enumerate(truth.boxes):
         if all(side is None for side in region.lower):
             yield f"truth.boxes[{i}]: forbids every state; give ends to at least one dimension"
 
 
-def _questions_without_truth(settings: Settings) -> Iterator[str]:
-    """What is asked of a truth, where nothing is forbidden."""
+def _questions_without_regions(settings: Settings) -> Iterator[str]:
+    """What is asked of a true region, where none is forbidden."""
     asked = {
         "next_task.repetitions": (settings.next_task.repetitions, 0),
         "areas.subsets": (settings.areas.subsets, 0),
@@ -70,7 +72,7 @@ def _questions_without_truth(settings: Settings) -> Iterator[str]:
         "transfer.strengths": (list(settings.transfer.strengths), []),
     }
     for key, (value, nothing) in asked.items():
-        if value and settings.truth.name == NO_TRUTH:
+        if value:
             yield f"{key}: {value}, but no truth is there to ask about; set it to {nothing}"
 
 

@@ -36,6 +36,7 @@ def page(
     *,
     title: str,
     about: str = "",
+    beliefs: Sequence[str] = (),
     assumed: Sequence[str] = (),
     doubtful: Sequence[str] = (),
     truth: Regions | None = None,
@@ -46,6 +47,7 @@ def page(
         answer: what was inferred.
         demonstrations: the N that it is from, in its order; their paths are drawn.
         title: of the page.
+        beliefs: what else is believed, such as of sets, a sentence each below the answer.
         about: where the demonstrations come from, in a sentence or two below the title.
         assumed: what reading the demonstrations took for granted, a phrase each.
         doubtful: what makes the answer doubtful, beside its own warnings.
@@ -68,7 +70,7 @@ def page(
         "about": f"<p>{html.escape(about)}</p>" if about else "",
         "counts": f"{counted(count, 'demonstration')}, {counted(len(regions), 'region')}",
         "headline": html.escape(headline),
-        "answer": _paragraphs(sentences),
+        "answer": _paragraphs([*sentences, *beliefs]),
         "planes": "".join(
             f'<option value="{k}">{html.escape(name)}</option>' for k, name in enumerate(names)
         ),

@@ -6,7 +6,9 @@ import numpy as np
 
 from experiments.config.read import settings_of_record
 from experiments.config.settings import Settings
+from experiments.config.settings.controls import ranges_of
 from experiments.lookback.archive import ArchiveError, Facts
+from experiments.page.beliefs import belief_sentences
 from experiments.page.document import page
 from experiments.page.words import where
 from experiments.point.inference import infer_point, point_answer
@@ -35,6 +37,7 @@ def point_page(facts: Facts) -> str:
         raise ArchiveError(f"{identity}: the source has changed since it ran; run it again first")
     settings = settings_of_record(facts.record["config"])
     inferred = infer_point(settings, Store(facts.point.results / "store"))
+    regions = inferred.inference.hypotheses
     calibration, names = inferred.calibration, settings.model.space.names
     concerns = inferred.diagnosis.concerns(names, inferred.unreachable, len(inferred.numbers))
     return page(
@@ -42,6 +45,7 @@ def point_page(facts: Facts) -> str:
         inferred.demonstrations,
         title=f"Point {identity[:_SHORT]}: what simulated demonstrators avoided",
         about=_about(settings, inferred.inference),
+        beliefs=belief_sentences(inferred.sets, regions.names, inferred.controls),
         assumed=[] if calibration is None else [calibration.summary()],
         doubtful=list(concerns),
         truth=settings.constraint,
@@ -52,6 +56,9 @@ def _about(settings: Settings, inference: Inference) -> str:
     """What the point is, and where the ranking has the truth."""
     options = ", ".join(f"{name} {value}" for name, value in settings.columns.items())
     truth, regions = settings.constraint, inference.hypotheses
+    if settings.truth.controls:
+        names = listed(ranges_of(settings.truth.controls, settings.model).names)
+        return f"{options}. Forbidden in truth: {names}."
     if not len(truth):
         return f"{options}. Nothing is forbidden in truth."
     boxes = "; ".join(where(truth, i) for i in range(len(truth)))

@@ -52,24 +52,10 @@ def forecast_calibration(settings: Settings, store: Store) -> Calibration:
     """The map of forecasts and their scores, from the store or computed."""
 
     def compute() -> dict[str, np.ndarray]:
-        system, demonstrator = settings.model, settings.demonstrations
-        trials = sample_trials(
-            system,
-            None,
-            settings.tasks.start_box(system.space),
-            trials=TRIALS,
-            seed=SEED,
-            horizon=settings.horizon,
-            dt=demonstrator.dt,
-            goal_offsets=settings.tasks.goal_offsets,
-            restarts=demonstrator.restarts,
-            hold=demonstrator.hold,
-        )
-        attempts = demonstrate(system, trials, None, None, **nominal_skill(settings))
         model = tabular_model(settings, store)
         calibration = calibrate_on(
             model,
-            [each.demonstration for each in attempts if each.outcome is Outcome.KEPT],
+            free_demonstrations(settings),
             tried=TRIALS,
             hypotheses=model.regions.mask(settings.candidates.names),
             exact_ends=settings.inference.exact_ends,
@@ -78,6 +64,25 @@ def forecast_calibration(settings: Settings, store: Store) -> Calibration:
 
     modules = _modules(settings)
     return _calibration(store.get("forecasts", forecast_inputs(settings), modules, compute))
+
+
+def free_demonstrations(settings: Settings) -> list[Demonstration]:
+    """What the demonstrator that inference knows of does without a constraint."""
+    system, demonstrator = settings.model, settings.demonstrations
+    trials = sample_trials(
+        system,
+        None,
+        settings.tasks.start_box(system.space),
+        trials=TRIALS,
+        seed=SEED,
+        horizon=settings.horizon,
+        dt=demonstrator.dt,
+        goal_offsets=settings.tasks.goal_offsets,
+        restarts=demonstrator.restarts,
+        hold=demonstrator.hold,
+    )
+    attempts = demonstrate(system, trials, None, None, **nominal_skill(settings))
+    return [each.demonstration for each in attempts if each.outcome is Outcome.KEPT]
 
 
 def _modules(settings: ModelSettings) -> list[ModuleType]:
@@ -167,10 +172,7 @@ def _arrays(calibration: Calibration) -> dict[str, np.ndarray]:
     arrays = {"tasks": np.array([calibration.tried, calibration.used])}
     if calibration.out_of_reach is not None:
         arrays["out_of_reach"] = np.array(calibration.out_of_reach)
-    if calibration.map is not None:
-        arrays["curves"] = np.array(
-            [[*curve.sizes, *dataclasses.astuple(curve)[1:]] for curve in calibration.map.curves]
-        )
+    arrays |= map_arrays(calibration.map)
     for name in _JUDGED:
         scores = getattr(calibration, name)
         if scores is not None:
@@ -181,20 +183,33 @@ def _arrays(calibration: Calibration) -> dict[str, np.ndarray]:
 
 def _calibration(arrays: Mapping[str, np.ndarray]) -> Calibration:
     """The calibration that some arrays hold."""
-    curves = [
-        ForecastCurve((row[0], row[1]), int(row[2]), int(row[3]), *row[4:])
-        for row in arrays.get("curves", np.empty((0, 8))).tolist()
-    ]
     out_of_reach = arrays.get("out_of_reach")
     before, after = (_scores(arrays, name) for name in _JUDGED)
     return Calibration(
         tried=int(arrays["tasks"][0]),
         used=int(arrays["tasks"][1]),
-        map=ForecastMap(tuple(curves)) if curves else None,
+        map=stored_map(arrays),
         before=before,
         after=after,
         out_of_reach=None if out_of_reach is None else float(out_of_reach),
     )
+
+
+def map_arrays(forecasts: ForecastMap | None) -> dict[str, np.ndarray]:
+    """A map as arrays, for the store."""
+    if forecasts is None:
+        return {}
+    rows = [[*curve.sizes, *dataclasses.astuple(curve)[1:]] for curve in forecasts.curves]
+    return {"curves": np.array(rows)}
+
+
+def stored_map(arrays: Mapping[str, np.ndarray]) -> ForecastMap | None:
+    """The map that some arrays hold, if they do."""
+    curves = [
+        ForecastCurve((row[0], row[1]), int(row[2]), int(row[3]), *row[4:])
+        for row in arrays.get("curves", np.empty((0, 8))).tolist()
+    ]
+    return ForecastMap(tuple(curves)) if curves else None
 
 
 def _scores(arrays: Mapping[str, np.ndarray], name: str) -> ForecastScores | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.config.settings import ESTIMATE, Settings
+from experiments.point.controls import point_controls
 from experiments.point.forecasts import forecast_calibration
 from experiments.point.no_answer import NoAnswer, why_none
 from experiments.point.sets import set_belief
@@ -14,6 +15,7 @@ from experiments.point.stages import tabular_model
 from experiments.point.streams import Purpose, stream
 from experiments.point.trials import TrialSet, demonstrations
 from experiments.tracking.store import Store
+from mlci.actuation.inference import ControlInference
 from mlci.answers import Answer, answer
 from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
@@ -40,6 +42,7 @@ class PointInference:
         diagnosis: how the model moves.
         calibration: how often the model's forecasts come true, where evidence is to be calibrated.
         sets: belief over sets of hypotheses, where it is asked for.
+        controls: what is believed of controls, likewise.
     """
 
     trials: TrialSet
@@ -52,6 +55,7 @@ class PointInference:
     diagnosis: Diagnosis
     calibration: Calibration | None = None
     sets: SetPosterior | None = None
+    controls: ControlInference | None = None
 
     @property
     def unreachable(self) -> int:
@@ -113,6 +117,7 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         sets=set_belief(
             settings, model, paths, inference, stream(settings.seed, Purpose.SETS, 0), hypotheses
         ),
+        controls=point_controls(settings, store, model, paths),
     )
 
 

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
+from experiments.belief_lines import control_lines, set_lines
 from experiments.config.settings import Settings
 from experiments.console import (
     answer_lines,
     diagnosis_lines,
     measure_lines,
-    set_lines,
     trial_lines,
 )
 from experiments.point.inference import infer_point, point_answer
@@ -47,6 +47,8 @@ def run_point(
     for line in answer_lines(result, top, covered):
         log(line)
     for line in set_lines(inferred.sets, inference.hypotheses.names):
+        log(line)
+    for line in control_lines(inferred.controls, top):
         log(line)
     if inferred.calibration is not None:
         for line in entry("calibration", inferred.calibration.summary()):

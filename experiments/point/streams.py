@@ -26,6 +26,7 @@ class Purpose(IntEnum):
     AREAS = 9
     SOFT = 10
     TRANSFER = 11
+    CONTROLS = 12
 
 
 def stream(seed: int, purpose: Purpose, *index: int) -> np.random.Generator:

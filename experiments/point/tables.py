@@ -9,6 +9,7 @@ from experiments.config.settings import Settings
 from experiments.point.area_tables import area_tables
 from experiments.point.baseline_tables import baseline_table
 from experiments.point.belief_counts import belief_counts
+from experiments.point.controls import control_tables
 from experiments.point.evidence_kinds import evidence_table
 from experiments.point.forecasts import forecast_table
 from experiments.point.inference import PointInference
@@ -52,7 +53,7 @@ def point_tables(
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
         `dimensions` of the state, and `regions` of the truth. If asked for, `sets` and
         `set_marginals`; `calibration`, and `evidence` and `forecasts` where these are calibrated;
-        `baselines`, `next_task`, `soft`, and `areas` and `area_map`.
+        `baselines`, `next_task`, `soft`, `controls` and `control_ranks`, `areas` and `area_map`.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -93,6 +94,9 @@ def point_tables(
         tables |= area_tables(settings, point)
     if settings.next_task.repetitions:
         tables["next_task"] = next_task_table(settings, point)
+    if point.controls is not None:
+        rng = stream(settings.seed, Purpose.CONTROLS, 0)
+        tables |= control_tables(settings, point.controls, rng)
     if settings.soft.weights:
         tables["soft"] = soft_table(settings, point)
     return tables

@@ -95,6 +95,7 @@ def demonstration_inputs(settings: Settings, safe_set_key: str | None) -> tuple[
         settings.safety,
         settings.horizon,
         settings.seed,
+        settings.truth.controls,
     )
 
 
@@ -164,13 +165,15 @@ def _attempts(
 ) -> list[Attempt]:
     """What becomes of every trial; who ignores the constraint may enter the truth."""
     attempts: dict[int, Attempt] = {}
-    for members, truth, kept_by in (
-        (np.flatnonzero(~breaking), settings.constraint, safety_filter),
-        (np.flatnonzero(breaking), None, None),
+    skill = _skill(settings)
+    limited = skill | {"limit": settings.control_limit}
+    for members, truth, kept_by, skill_of in (
+        (np.flatnonzero(~breaking), settings.constraint, safety_filter, limited),
+        (np.flatnonzero(breaking), None, None, skill),
     ):
         if len(members):
             tried = [trials[member] for member in members]
-            of_members = demonstrate(settings.real_model, tried, truth, kept_by, **_skill(settings))
+            of_members = demonstrate(settings.real_model, tried, truth, kept_by, **skill_of)
             attempts |= dict(zip(members.tolist(), of_members, strict=True))
     return [attempts[number] for number in range(len(trials))]
 

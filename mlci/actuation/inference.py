@@ -16,7 +16,7 @@ import numpy as np
 from mlci.actuation.hypotheses import ControlHypotheses
 from mlci.actuation.moves import ControlledMoves
 from mlci.demonstrations import Demonstration
-from mlci.evidence import DEFAULT_MODEL_ERROR, Ranking, Rates, rank_constraints
+from mlci.evidence import DEFAULT_MODEL_ERROR, Ranking, Rates, log_evidence, rank_evidence
 from mlci.forecasts import ForecastMap, fit_map
 from mlci.spaces import Bools, Floats
 from mlci.systems import System
@@ -52,20 +52,17 @@ class ControlInference:
     calibration: ForecastMap | None = None
 
     @cached_property
-    def ranking(self) -> Ranking:
-        """Gain, rank and posterior of each hypothesis."""
+    def evidence(self) -> Floats:
+        """(N, C) log evidence of each demonstration [nat], see `mlci.evidence.log_evidence`."""
         alpha, forecasts = self.avoidance, self.calibration
         if forecasts is not None:
             alpha = forecasts.avoidance(alpha, self.shares)
-        return rank_constraints(alpha, self.applied, self.prior_none, rates=self.rates)
+        return log_evidence(alpha, self.applied, self.rates)
 
-    def of(self, numbers: Sequence[int] | slice) -> ControlInference:
-        """What some of the demonstrations say."""
-        names = tuple(np.array(self.names, dtype=object)[numbers])
-        of = self.avoidance[numbers], self.applied[numbers]
-        return ControlInference(
-            self.hypotheses, names, *of, self.shares, self.prior_none, self.rates, self.calibration
-        )
+    @cached_property
+    def ranking(self) -> Ranking:
+        """Gain, rank and posterior of each hypothesis."""
+        return rank_evidence(self.evidence, self.applied, self.prior_none)
 
     def to_frame(self) -> pd.DataFrame:
         """A row a hypothesis, the most likely first: its `name`; `rank`; `gain` [nat];

@@ -24,7 +24,8 @@ class ControlRanges(ControlHypotheses):
     Attributes:
         lower: (C, m) lower ends, -inf where there is none.
         upper: (C, m) upper ends, +inf where there is none.
-        names: (C,) name of each, all different; by default its number, from "0".
+        names: (C,) name of each, all different; by default its ends in words, such as "control 0
+            above 0.5".
 
     Raises:
         ValueError: ends of the wrong shape, an empty range, one that is everything, or names that
@@ -49,9 +50,9 @@ class ControlRanges(ControlHypotheses):
                 f"control range {first} needs lower < upper and a finite end: "
                 f"{lower[first].tolist()} to {upper[first].tolist()}"
             )
-        names = tuple(self.names) or tuple(map(str, range(len(lower))))
+        names = tuple(self.names) or tuple(map(_described, lower, upper))
         if len(names) != len(lower) or len(set(names)) < len(names):
-            raise ValueError(f"{len(lower)} ranges need as many different names, not {names}")
+            raise ValueError(f"{len(lower)} ranges need as many different names, not {list(names)}")
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
         object.__setattr__(self, "names", names)
@@ -69,19 +70,18 @@ class ControlRanges(ControlHypotheses):
         """
         if not all(0 < share < 1 for share in shares):
             raise ValueError(f"shares of a control's range lie in (0, 1), not {list(shares)}")
-        box, lower, upper, names = system.control_box, [], [], []
+        box, lower, upper = system.control_box, [], []
         middle, half = (box.lower + box.upper) / 2, box.widths / 2
         for k in range(box.dimension):
-            for sign, word in ((1.0, "above"), (-1.0, "below")):
+            for sign in (1.0, -1.0):
                 for share in shares:
                     end = middle[k] + sign * share * half[k]
                     free = np.full((2, box.dimension), [[-np.inf], [np.inf]])
                     free[0 if sign > 0 else 1, k] = end
                     lower.append(free[0])
                     upper.append(free[1])
-                    names.append(f"control {k} {word} {end:.6g}")
         m = box.dimension
-        return cls(np.reshape(lower, (-1, m)), np.reshape(upper, (-1, m)), tuple(names))
+        return cls(np.reshape(lower, (-1, m)), np.reshape(upper, (-1, m)))
 
     def check(self, system: System) -> None:
         """See `ControlHypotheses.check`: they are ranges of as many controls as it has."""
@@ -95,6 +95,18 @@ class ControlRanges(ControlHypotheses):
         """See `ControlHypotheses.holds`; states do not matter."""
         inside = (controls[..., None, :] > self.lower) & (controls[..., None, :] < self.upper)
         return np.asarray(np.all(inside, axis=-1))
+
+    def left_by_all(self, box: Box) -> Box:
+        """What the ranges together leave of a control box.
+
+        Raises:
+            ValueError: as of `left_of`.
+        """
+        for index in range(len(self)):
+            apart = (self.upper[index] <= box.lower) | (self.lower[index] >= box.upper)
+            if not np.any(apart):  # else an earlier one has cut off more
+                box = self.left_of(box, index)
+        return box
 
     def left_of(self, box: Box, index: int) -> Box:
         """What range `index` leaves of a control box: the limit of who keeps out of it.
@@ -112,6 +124,21 @@ class ControlRanges(ControlHypotheses):
                 np.where(first > box.lower, first, box.upper),
             )
         raise ValueError(
-            f"range {self.names[index]} leaves no box of the controls {box}: it must cut off one "
-            "end of one control"
+            f"{self.names[index]} leaves no interval of each control, from {box.lower.tolist()} to "
+            f"{box.upper.tolist()}: it must cut off one end of one control"
         )
+
+
+def _described(lower: Floats, upper: Floats) -> str:
+    """The ends of a range (m,) in words."""
+    words = {
+        (True, True): "from {low:.6g} to {high:.6g}",
+        (True, False): "above {low:.6g}",
+        (False, True): "below {high:.6g}",
+    }
+    ends = enumerate(zip(lower.tolist(), upper.tolist(), strict=True))
+    return ", ".join(
+        f"control {k} " + words[finite].format(low=low, high=high)
+        for k, (low, high) in ends
+        if any(finite := (low > -np.inf, high < np.inf))
+    )

@@ -10,7 +10,6 @@ from mlci.calibration import (
     calibrate,
     calibrate_on,
     certain_by_ends,
-    similar_tasks,
 )
 from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.forecasts import fit_map, is_possible
@@ -18,6 +17,7 @@ from mlci.grids import Grid
 from mlci.preparation import prepare
 from mlci.region_sizes import region_sizes
 from mlci.regions import Regions
+from mlci.similar_tasks import similar_tasks
 from mlci.spaces import Box, StateSpace
 from mlci.systems import DoubleIntegrator, Pendulum
 from mlci.tabular import TabularModel, action_grid, discretize

@@ -3,6 +3,7 @@
 from experiments.config.settings.advice import AdviceSettings
 from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
+from experiments.config.settings.controls import ControlHypothesesSettings, ControlRange
 from experiments.config.settings.kinds import ESTIMATE
 from experiments.config.settings.parts import (
     NO_TRUTH,
@@ -42,6 +43,8 @@ __all__ = [
     "BallSettings",
     "BaselineSettings",
     "CalibrationSettings",
+    "ControlHypothesesSettings",
+    "ControlRange",
     "DemonstrationSettings",
     "GridSettings",
     "HalfSpaceSettings",

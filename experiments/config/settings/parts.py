@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from experiments.config.settings.controls import ControlHypothesesSettings, ForbiddenControls
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
@@ -87,6 +88,7 @@ class TruthSettings(ShapeList):
 
     name: Annotated[Word, about(f"what tables call it; `{NO_TRUTH}` where nothing is forbidden")]
     cell: Annotated[Index | None, about("or one of the hypotheses, by its number")]
+    controls: ForbiddenControls
 
     @property
     def label(self) -> str:
@@ -128,6 +130,7 @@ class HypothesesSettings(ShapeList):
             "is none"
         ),
     ]
+    controls: ControlHypothesesSettings
 
     def regions(self, space: StateSpace) -> Regions:
         """All hypotheses, in the order in which tables number them."""

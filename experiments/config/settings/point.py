@@ -13,6 +13,7 @@ from pydantic.dataclasses import dataclass
 from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
 from experiments.config.settings.constraint import SoftSettings, TransferSettings
+from experiments.config.settings.controls import ranges_of
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
@@ -160,6 +161,19 @@ class Settings(ModelSettings):
             shapes = [self.candidates.shape(self.truth.cell)]
         names = [f"truth_{number}" for number in range(len(shapes))]
         return Regions.from_shapes(self.model.space, shapes, names)
+
+    @cached_property
+    def control_limit(self) -> Box | None:
+        """Range of the controls of those who keep to the truth; None for no limit.
+
+        Raises:
+            ValueError: forbidden ranges that leave no box.
+        """
+        box = limit = self.model.control_box if self.demonstrations.clip else None
+        if self.truth.controls:
+            far = np.full(self.model.control_box.dimension, np.inf)
+            limit = ranges_of(self.truth.controls, self.model).left_by_all(box or Box(-far, far))
+        return limit
 
     @property
     def shape_lists(self) -> tuple[ShapeList, ...]:

@@ -229,7 +229,10 @@ def test_ranges_that_a_model_cannot_tell_are_refused() -> None:
     regions = Regions.from_boxes(CART.space, [])
     model = discretize(CART, Grid(CART.space, (6, 6)), action_grid(CART, 3), 0.5, regions)
     narrow = ControlRanges([[0.2 * LIMIT]], [[0.4 * LIMIT]])
-    with pytest.raises(ValueError, match="0 forbids none of the model's moves, of 3 actions"):
+    with pytest.raises(
+        ValueError,
+        match=r"control 0 from 0\.2 to 0\.4 forbids none of the model's moves, of 3 actions",
+    ):
         infer_controls(model, [], narrow)
     with pytest.raises(ValueError, match="ranges of 2 controls do not fit actions of 1"):
         infer_controls(model, [], ControlRanges([[0.0, 0.0]], [[1.0, 1.0]]))

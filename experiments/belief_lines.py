@@ -1,0 +1,76 @@
+"""What a person reads on the terminal of beliefs beside the ranking: sets of regions, controls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from experiments.console import probability
+from experiments.terminal import entry, table_lines
+from mlci.actuation.inference import ControlInference
+from mlci.answers import listed
+from mlci.sets.posterior import SetPosterior
+
+_MARGINALS = 5  # that are printed
+
+
+def set_lines(sets: SetPosterior | None, names: Sequence[str]) -> Iterator[str]:
+    """The most probable set, the regions that are most probably forbidden, and how sure that is."""
+    if sets is None:
+        return
+    best, marginal = sets.most_probable(), sets.marginal
+    first = np.argsort(-marginal, kind="stable")[:_MARGINALS]
+    likely = ", ".join(f"{names[i]} {probability(marginal[i])}" for i in first)
+    members = f"is that of {listed([names[i] for i in best])}" if best else "forbids nothing"
+    yield from entry(
+        "sets",
+        f"the most probable set {members}, with probability "
+        f"{probability(sets.probability_of(best))}; forbidden, alone or with others: {likely}",
+    )
+    if sets.check is not None:
+        yield from entry("", str(sets.check))
+        if not sets.check.agrees:
+            yield from entry("warning", "chains over sets disagree: raise inference.sets.steps")
+
+
+def control_lines(controls: ControlInference | None, top: int) -> Iterator[str]:
+    """The first ranges of controls, and what their ranking takes for granted."""
+    if controls is None:
+        return
+    frame, none = controls.to_frame(), probability(controls.ranking.posterior_none)
+    yield from entry("controls", control_words(controls))
+    first = frame[frame["gain"] > -np.inf].head(top)
+    rows = [["range", "gain [nat]", "posterior", "applied by"]]
+    rows += [
+        [name, f"{gain:.3f}".rjust(10), probability(share).rjust(9), str(count).rjust(10)]
+        for name, gain, share, count in zip(
+            *(first[key] for key in ("name", "gain", "posterior", "applied_by")), strict=True
+        )
+    ]
+    rows.append(["none", "0.000".rjust(10), none.rjust(9), ""])
+    yield from (f"  {line}" for line in table_lines(rows))
+    yield from entry("assumed", controls_assumed(controls))
+
+
+def control_words(controls: ControlInference) -> str:
+    """Which range comes first, and how it compares with there being none."""
+    first, ranking = controls.ranking.order[0], controls.ranking
+    none = probability(ranking.posterior_none)
+    if not ranking.gain[first] > 0:
+        return f"no forbidden range is more likely than none, whose probability is {none}"
+    name, chance = controls.hypotheses.names[first], probability(ranking.posterior[first])
+    return f"that {name} is forbidden is the most likely, with probability {chance}; nothing {none}"
+
+
+def controls_assumed(controls: ControlInference) -> str:
+    """What a ranking of ranges of controls takes for granted."""
+    people = (
+        "chances as the tabular agent's"
+        if controls.calibration is None
+        else "chances calibrated by a simulated demonstrator whom nothing limits"
+    )
+    return (
+        "at most one range is forbidden, and no region; controls that are not recorded come from "
+        f"inverse dynamics; {people}"
+    )

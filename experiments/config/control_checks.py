@@ -1,0 +1,82 @@
+"""What is wrong with constraints on controls, of a truth or of hypotheses.
+
+Each check yields a line for each fault: the key, the value and the way out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from experiments.config.settings import ControlRange, ModelSettings, Settings
+from mlci.systems import System
+
+
+def control_hypothesis_problems(settings: ModelSettings) -> Iterator[str]:
+    """Ranges that do not match the controls, are there twice, or hold no action."""
+    key, controls, system = "hypotheses.controls", settings.hypotheses.controls, settings.model
+    faults = list(_range_problems(f"{key}.ranges", controls.ranges, system))
+    yield from faults
+    if faults:
+        return
+    try:
+        hypotheses = controls.hypotheses(system)
+    except ValueError as error:
+        yield f"{key}: {error}; name each range once, by ranges or by shares"
+        return
+    actions = settings.action_values
+    held = hypotheses.holds(np.zeros((len(actions), 0)), actions)
+    for i in np.flatnonzero(~np.any(held, axis=0)):
+        yield (
+            f"{key}: {hypotheses.names[i]} holds none of the {len(actions)} actions, so that the "
+            "tabular model cannot tell; raise `actions`, or widen the range"
+        )
+
+
+def control_truth_problems(settings: Settings) -> Iterator[str]:
+    """Forbidden controls that leave no box, and what cannot be had beside them."""
+    truth, key = settings.truth, "truth.controls"
+    if not truth.controls:
+        return
+    faults = list(_range_problems(key, truth.controls, settings.model))
+    yield from faults
+    if not faults:
+        try:
+            _ = settings.control_limit
+        except ValueError as error:
+            ends = "; with demonstrations.clip=true the control range has ends"
+            yield f"{key}: {error}{'' if settings.demonstrations.clip else ends}"
+    if truth.count or truth.cell is not None:
+        yield (
+            f"{key}: {len(truth.controls)} ranges and regions are given, but the safe set knows "
+            "of no forbidden controls; keep the ranges or the regions"
+        )
+
+
+def _range_problems(key: str, listed: tuple[ControlRange, ...], system: System) -> Iterator[str]:
+    """Ranges that do not match the controls of a system."""
+    box = system.control_box
+    for i, each in enumerate(listed):
+        for name in ("lower", "upper"):
+            ends = getattr(each, name)
+            if len(ends) != box.dimension:
+                yield (
+                    f"{key}[{i}].{name}: {list(ends)} must have {box.dimension} entries, one a "
+                    "control, null where there is no end"
+                )
+        if not len(each.lower) == len(each.upper) == box.dimension:
+            continue
+        if all(end is None for end in (*each.lower, *each.upper)):
+            yield f"{key}[{i}]: holds every control; give it an end"
+        for k, (low, high) in enumerate(zip(each.lower, each.upper, strict=True)):
+            first, last = box.lower[k], box.upper[k]
+            if low is not None and high is not None and low >= high:
+                yield f"{key}[{i}]: control {k} from {low} to {high}; lower must be below upper"
+            elif (low is not None and low >= last) or (high is not None and high <= first):
+                yield (
+                    f"{key}[{i}]: holds nothing of control {k}, which goes from {first:g} to "
+                    f"{last:g}; move the range inside"
+                )
+    if len({(each.lower, each.upper) for each in listed}) < len(listed):
+        yield f"{key}: a range is given twice; name each once"

@@ -1,0 +1,68 @@
+"""Sentences of the page about sets of regions, and about controls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from experiments.belief_lines import controls_assumed
+from experiments.page.words import of_100
+from mlci.actuation.inference import ControlInference
+from mlci.answers import listed
+from mlci.sets.posterior import SetPosterior
+
+_NAMED = 5  # regions, or ranges
+
+
+def belief_sentences(
+    sets: SetPosterior | None, names: Sequence[str], controls: ControlInference | None
+) -> list[str]:
+    """What is believed of sets of the regions of these names, and of controls."""
+    return [*_set_sentences(sets, names), *_control_sentences(controls)]
+
+
+def _set_sentences(sets: SetPosterior | None, names: Sequence[str]) -> list[str]:
+    """What is believed of several regions at once; nothing where that is not asked."""
+    if sets is None:
+        return []
+    best, marginal = sets.most_probable(), sets.marginal
+    chance = of_100(sets.probability_of(best))
+    members = [names[i] for i in best]
+    if not best:
+        answer = "that nothing is avoided"
+    elif len(best) == 1:
+        answer = f"region {members[0]} alone"
+    else:
+        answer = f"regions {listed(members)} together"
+    likely = np.argsort(-marginal, kind="stable")[:_NAMED]
+    each = ", ".join(f"{names[i]} {of_100(marginal[i])}" for i in likely)
+    sentences = [
+        f"If several regions may be avoided at once, the likeliest answer is {answer}: {chance}.",
+        f"How likely it is that a region is avoided, alone or with others: {each}.",
+    ]
+    if sets.check is not None:
+        agree = "which agree" if sets.check.agrees else "which DISAGREE: do not rely on it"
+        sentences.append(f"This is estimated from a sample by several chains, {agree}.")
+    return sentences
+
+
+def _control_sentences(controls: ControlInference | None) -> list[str]:
+    """What is believed of controls; nothing where that is not asked."""
+    if controls is None:
+        return []
+    ranking, names = controls.ranking, controls.hypotheses.names
+    none, first = of_100(ranking.posterior_none), ranking.order[0]
+    if not ranking.gain[first] > 0:
+        sentences = [
+            "Controls: no range stands out; none is more likely to be out of use than that all are "
+            f"in use. How likely that is: {none}."
+        ]
+    else:
+        likely = [i for i in ranking.order[:_NAMED].tolist() if ranking.gain[i] > 0]
+        each = "; ".join(f"{names[i]}: {of_100(ranking.posterior[i])}" for i in likely)
+        sentences = [
+            f"Controls that are not applied, the likeliest first: {each}. That all are in use: "
+            f"{none}."
+        ]
+    return [*sentences, f"That takes for granted: {controls_assumed(controls)}."]

@@ -1,0 +1,179 @@
+"""What demonstrations say of controls, where a config asks: belief, tables and record."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+import mlci.actuation.inference
+import mlci.demonstrator
+from experiments.config.settings import ModelSettings, RecordedSettings, Settings
+from experiments.config.settings.controls import ranges_of
+from experiments.point.forecasts import (
+    TRIALS,
+    forecast_inputs,
+    free_demonstrations,
+    map_arrays,
+    stored_map,
+)
+from experiments.point.stages import system_module
+from experiments.progress import begin
+from experiments.tracking.store import Store
+from mlci.actuation.inference import ControlInference, calibrate_controls, infer_controls
+from mlci.demonstrations import Demonstration
+from mlci.evidence import posterior, total_gain
+from mlci.forecasts import ForecastMap
+from mlci.json_numbers import finite
+from mlci.metrics import random_subsets, truth_ranks
+from mlci.similar_tasks import similar_demonstrations
+from mlci.spaces import Bools
+from mlci.tabular import TabularModel
+
+
+def point_controls(
+    settings: Settings,
+    store: Store,
+    model: TabularModel,
+    demonstrations: Sequence[Demonstration],
+) -> ControlInference | None:
+    """What a point's demonstrations say of controls; None where nothing is asked of these."""
+    forecasts = None
+    if _is_asked(settings) and settings.inference.calibrate:
+        modules = [mlci.actuation.inference, mlci.demonstrator, system_module(settings.model)]
+        depends = (*forecast_inputs(settings), settings.hypotheses.controls)
+
+        def compute() -> dict[str, np.ndarray]:
+            return map_arrays(_fitted(settings, model, free_demonstrations(settings)))
+
+        stored = store.get("control_forecasts", depends, [*modules, sys.modules[__name__]], compute)
+        forecasts = stored_map(stored)
+    return _inferred(settings, model, demonstrations, forecasts)
+
+
+def recorded_controls(
+    settings: RecordedSettings, model: TabularModel, demonstrations: Sequence[Demonstration]
+) -> ControlInference | None:
+    """What recorded demonstrations say of controls; None where nothing is asked of these."""
+    forecasts = None
+    if _is_asked(settings):
+        begin("ranking ranges of controls")
+        if settings.inference.calibrate:
+            rng = np.random.default_rng(0)
+            unlimited = similar_demonstrations(model, demonstrations, TRIALS, rng)
+            forecasts = _fitted(settings, model, unlimited)
+    return _inferred(settings, model, demonstrations, forecasts)
+
+
+def control_tables(
+    settings: Settings, controls: ControlInference, rng: np.random.Generator
+) -> dict[str, pd.DataFrame]:
+    """`controls`, a row a range, the most likely first; `control_ranks`, a row a random subset of
+    the demonstrations and kind of evidence.
+
+    Returns:
+        `controls` has the columns of `ControlInference.to_frame`; `is_truth`, whether a range is
+        all of what is forbidden; and `in_truth`, whether it is part of that. `control_ranks` has
+        `demonstrations`, their number; `subset`; `calibrated`, 1 if forecasts are; `rank` and
+        `posterior` of the truth, NaN where no hypothesis is; `none`, the posterior probability
+        that nothing is forbidden; `first`, the range that comes first; its `first_posterior`; and
+        `first_in_truth`.
+    """
+    is_truth, in_truth = _against_truth(settings)
+    names = np.array(controls.hypotheses.names, dtype=object)
+    rates = settings.inference.rates(calibrated=False)
+    kinds = [(0, replace(controls, calibration=None, rates=rates))]
+    if controls.calibration is not None:
+        kinds.append((1, controls))
+    ranks, rows = settings.ranks, []
+    for subsets in random_subsets(len(controls.names), ranks.demonstrations, ranks.subsets, rng):
+        for calibrated, kind in kinds:
+            gains = total_gain(kind.evidence[subsets])
+            each, none = posterior(gains, kind.prior_none)
+            first = np.argmax(gains, axis=1)
+            part = {
+                "demonstrations": subsets.shape[1],
+                "subset": np.arange(len(subsets)),
+                "calibrated": calibrated,
+                "rank": truth_ranks(gains, is_truth),
+                "posterior": each[:, is_truth].sum(axis=1) if is_truth.any() else np.nan,
+                "none": none,
+                "first": names[first],
+                "first_posterior": each[np.arange(len(first)), first],
+                "first_in_truth": in_truth[first].astype(int),
+            }
+            rows.append(pd.DataFrame(part))
+    order = controls.ranking.order
+    frame = controls.to_frame().assign(is_truth=is_truth[order], in_truth=in_truth[order])
+    return {"controls": frame, "control_ranks": pd.concat(rows, ignore_index=True)}
+
+
+def _against_truth(settings: Settings) -> tuple[Bools, Bools]:
+    """(C,) which hypotheses are what is forbidden in truth, and which are a part of it."""
+    system, truth = settings.model, ranges_of(settings.truth.controls, settings.model)
+    hypotheses, box = settings.hypotheses.controls.hypotheses(system), system.control_box
+    low, high = np.maximum(hypotheses.lower, box.lower), np.minimum(hypotheses.upper, box.upper)
+    from_, to = np.maximum(truth.lower, box.lower), np.minimum(truth.upper, box.upper)
+    inside = np.all((low[:, None] >= from_) & (high[:, None] <= to), axis=-1)
+    same = np.all((low[:, None] == from_) & (high[:, None] == to), axis=-1)
+    return np.any(same, axis=1), np.any(inside, axis=1)
+
+
+def control_record(controls: ControlInference) -> dict[str, Any]:
+    """The belief for programs, fit for JSON."""
+    calibration = controls.calibration
+    return {
+        "none": controls.ranking.posterior_none,
+        "largest_gain_of_one": None if calibration is None else calibration.largest_gain,
+        "ranges": [
+            {**row, "gain": finite(row["gain"])} for row in controls.to_frame().to_dict("records")
+        ],
+    }
+
+
+def _is_asked(settings: ModelSettings) -> bool:
+    """Whether there are hypotheses about controls."""
+    controls = settings.hypotheses.controls
+    return bool(controls.ranges or controls.shares)
+
+
+def _fitted(
+    settings: ModelSettings, model: TabularModel, unlimited: Sequence[Demonstration]
+) -> ForecastMap | None:
+    """The map of forecasts by demonstrators whom nothing limits."""
+    controls, system = settings.hypotheses.controls, settings.model
+    return calibrate_controls(
+        model,
+        unlimited,
+        controls.hypotheses(system),
+        tolerance=controls.reach(system),
+        exact_ends=settings.inference.exact_ends,
+        round_horizon=True,
+    )
+
+
+def _inferred(
+    settings: ModelSettings,
+    model: TabularModel,
+    demonstrations: Sequence[Demonstration],
+    forecasts: ForecastMap | None,
+) -> ControlInference | None:
+    """What demonstrations say of controls; None where nothing is asked of these."""
+    if not _is_asked(settings):
+        return None
+    controls, system = settings.hypotheses.controls, settings.model
+    return infer_controls(
+        model,
+        demonstrations,
+        controls.hypotheses(system),
+        tolerance=controls.reach(system),
+        prior_none=settings.inference.prior,
+        rates=settings.inference.rates(calibrated=forecasts is not None),
+        calibration=forecasts,
+        exact_ends=settings.inference.exact_ends,
+        round_horizon=True,
+    )
