@@ -1,4 +1,4 @@
-"""Tables of two studies that were never run: soft constraints, and transfer to other controls."""
+"""Tables of studies that were never run: soft constraints, limited controls, and transfer."""
 
 import numpy as np
 import pandas as pd
@@ -24,6 +24,35 @@ def soft_tables() -> dict[str, pd.DataFrame]:
         for k in range(10)
     ]
     return {"soft": pd.DataFrame(rows)}
+
+
+def control_tables() -> dict[str, pd.DataFrame]:
+    """A limit that is first from three demonstrations on, one that never is, and none, of which
+    half of the sets imagine one with the model's chances."""
+    rows = [
+        {
+            "truth": truth,
+            "demonstrations": size,
+            "calibrated": calibrated,
+            **{
+                f"{name}{end}": np.clip(value + shift, 0, 1)
+                for name, value in {
+                    "posterior": {"none": np.nan}.get(truth, size / 20),
+                    "true_first": {"none": np.nan, "weak": 1 - 0.3 / size}.get(truth, 0.5),
+                    "wrong": 0.5 / size if truth == "none" and not calibrated else 0.1 / size,
+                    "wrong_sure": 0.0,
+                }.items()
+                for end, shift in (("", 0.0), ("_low", -0.05), ("_high", 0.05))
+            },
+            "seeds": 2,
+        }
+        for truth in ("none", "weak", "weaker")
+        for size in (1, 2, 3, 5, 10, 20)
+        for calibrated in (0, 1)
+    ]
+    cases = pd.DataFrame({"truth": ["none", "weak", "weaker"]})
+    cases["case"] = ["no limit", "at most 1", "at least -0.5"]
+    return {"control_curve": pd.DataFrame(rows), "cases": cases}
 
 
 def transfer_tables() -> dict[str, pd.DataFrame]:

@@ -45,12 +45,13 @@ def study_tables(tables: Mapping[str, Path]) -> dict[str, pd.DataFrame]:
 
     Args:
         tables: the collated tables by name: `trials` makes `measures`, `ranks` makes `rank_curve`,
-            and `areas`, where it is, `area_curve`.
+            and `areas` and `control_ranks`, where they are, `area_curve` and `control_curve`.
     """
     makers = {
         "measures": ("trials", measures),
         "rank_curve": ("ranks", rank_curve),
         "area_curve": ("areas", area_curve),
+        "control_curve": ("control_ranks", control_curve),
     }
     return {
         name: make(_read(tables[source]))
@@ -124,13 +125,31 @@ def area_curve(areas: pd.DataFrame) -> pd.DataFrame:
         The opening columns but `seed`; `demonstrations`, `method`; the mean of each other column
         with `_low` and `_high`; how many `seeds`.
     """
+    return _mean_curve(areas, "method", "method")
+
+
+def control_curve(ranks: pd.DataFrame) -> pd.DataFrame:
+    """Where the true range of controls is, for each number of demonstrations of a group.
+
+    Args:
+        ranks: opening columns up to `seed`, `demonstrations`, `subset`, `calibrated`, `first`, and
+            columns whose means count; NaN is no value.
+
+    Returns:
+        As of `area_curve`, with `calibrated` in place of `method`.
+    """
+    return _mean_curve(ranks, "calibrated", "first")
+
+
+def _mean_curve(table: pd.DataFrame, kind: str, last: str) -> pd.DataFrame:
+    """Means of the columns after the last key, for each number of demonstrations and each kind."""
     rows = []
-    for opening, group in _groups(areas, ["demonstrations", "subset"]):
-        names = _columns_after(group, "method")
-        for (size, method), subsets in group.groupby(["demonstrations", "method"], sort=False):
+    for opening, group in _groups(table, ["demonstrations", "subset"]):
+        names = _columns_after(group, last)
+        for (size, value), subsets in group.groupby(["demonstrations", kind], sort=False):
             seeds = _sizes(subsets)
-            counts = resamples(seeds, [*opening.values(), str(size)])  # alike for all methods
-            row = {**opening, "demonstrations": size, "method": method}
+            counts = resamples(seeds, [*opening.values(), str(size)])  # alike for all kinds
+            row = {**opening, "demonstrations": size, kind: value}
             means = _mean_and_limits(subsets[names].to_numpy(dtype=float), counts)
             for name, *values in zip(names, *means, strict=True):
                 row |= dict(zip((name, f"{name}_low", f"{name}_high"), values, strict=True))

@@ -36,7 +36,7 @@ def _set_sentences(sets: SetPosterior | None, names: Sequence[str]) -> list[str]
     else:
         answer = f"regions {listed(members)} together"
     likely = np.argsort(-marginal, kind="stable")[:_NAMED]
-    each = ", ".join(f"{names[i]} {of_100(marginal[i])}" for i in likely)
+    each = "; ".join(f"region {names[i]}: {of_100(marginal[i])}" for i in likely)
     sentences = [
         f"If several regions may be avoided at once, the likeliest answer is {answer}: {chance}.",
         f"How likely it is that a region is avoided, alone or with others: {each}.",

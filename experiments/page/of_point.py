@@ -57,8 +57,8 @@ def _about(settings: Settings, inference: Inference) -> str:
     options = ", ".join(f"{name} {value}" for name, value in settings.columns.items())
     truth, regions = settings.constraint, inference.hypotheses
     if settings.truth.controls:
-        names = listed(ranges_of(settings.truth.controls, settings.model).names)
-        return f"{options}. Forbidden in truth: {names}."
+        controls = listed(ranges_of(settings.truth.controls, settings.model).names)
+        return f"{options}. Forbidden in truth: {controls}."
     if not len(truth):
         return f"{options}. Nothing is forbidden in truth."
     boxes = "; ".join(where(truth, i) for i in range(len(truth)))

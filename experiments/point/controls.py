@@ -25,6 +25,7 @@ from experiments.point.stages import system_module
 from experiments.progress import begin
 from experiments.tracking.store import Store
 from mlci.actuation.inference import ControlInference, calibrate_controls, infer_controls
+from mlci.actuation.ranges import ControlRanges
 from mlci.demonstrations import Demonstration
 from mlci.evidence import posterior, total_gain
 from mlci.forecasts import ForecastMap
@@ -78,12 +79,14 @@ def control_tables(
     Returns:
         `controls` has the columns of `ControlInference.to_frame`; `is_truth`, whether a range is
         all of what is forbidden; and `in_truth`, whether it is part of that. `control_ranks` has
-        `demonstrations`, their number; `subset`; `calibrated`, 1 if forecasts are; `rank` and
-        `posterior` of the truth, NaN where no hypothesis is; `none`, the posterior probability
-        that nothing is forbidden; `first`, the range that comes first; its `first_posterior`; and
-        `first_in_truth`.
+        `demonstrations`, their number; `subset`; `calibrated`, 1 if forecasts are; `first`, the
+        range that comes first; `rank` and `posterior` of the truth, and whether it comes first
+        alone (`true_first`), NaN where no hypothesis is the truth; `none`, the posterior
+        probability that nothing is forbidden; whether the most probable answer is a range that is
+        no part of the truth (`wrong`), and one above 0.5 (`wrong_sure`).
     """
     is_truth, in_truth = _against_truth(settings)
+    known = is_truth.any()
     names = np.array(controls.hypotheses.names, dtype=object)
     rates = settings.inference.rates(calibrated=False)
     kinds = [(0, replace(controls, calibration=None, rates=rates))]
@@ -94,17 +97,19 @@ def control_tables(
         for calibrated, kind in kinds:
             gains = total_gain(kind.evidence[subsets])
             each, none = posterior(gains, kind.prior_none)
-            first = np.argmax(gains, axis=1)
+            first, best = np.argmax(gains, axis=1), np.max(each, axis=1)
+            rank, wrong = truth_ranks(gains, is_truth), ~in_truth[first] & (best > none)
             part = {
                 "demonstrations": subsets.shape[1],
                 "subset": np.arange(len(subsets)),
                 "calibrated": calibrated,
-                "rank": truth_ranks(gains, is_truth),
-                "posterior": each[:, is_truth].sum(axis=1) if is_truth.any() else np.nan,
+                "first": np.where(np.max(gains, axis=1) > -np.inf, names[first], ""),
+                "rank": rank,
+                "posterior": each[:, is_truth].sum(axis=1) if known else np.nan,
                 "none": none,
-                "first": names[first],
-                "first_posterior": each[np.arange(len(first)), first],
-                "first_in_truth": in_truth[first].astype(int),
+                "true_first": (rank == 1).astype(int) if known else np.nan,
+                "wrong": wrong.astype(int),
+                "wrong_sure": (wrong & (best > 0.5)).astype(int),
             }
             rows.append(pd.DataFrame(part))
     order = controls.ranking.order
@@ -125,12 +130,18 @@ def _against_truth(settings: Settings) -> tuple[Bools, Bools]:
 
 def control_record(controls: ControlInference) -> dict[str, Any]:
     """The belief for programs, fit for JSON."""
-    calibration = controls.calibration
+    calibration, ranges = controls.calibration, controls.hypotheses
+    assert isinstance(ranges, ControlRanges)
+    ends = {
+        name: {"lower": list(map(finite, low)), "upper": list(map(finite, high))}
+        for name, low, high in zip(ranges.names, ranges.lower, ranges.upper, strict=True)
+    }
     return {
         "none": controls.ranking.posterior_none,
         "largest_gain_of_one": None if calibration is None else calibration.largest_gain,
         "ranges": [
-            {**row, "gain": finite(row["gain"])} for row in controls.to_frame().to_dict("records")
+            {**row, **ends[row["name"]], "gain": finite(row["gain"])}
+            for row in controls.to_frame().to_dict("records")
         ],
     }
 

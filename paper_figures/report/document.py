@@ -20,6 +20,7 @@ from paper_figures.report import (
     section_choices,
     section_chosen_tasks,
     section_control_noise,
+    section_controls,
     section_costs,
     section_evidence,
     section_origin,
@@ -144,6 +145,17 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         (
             Figure(
                 "transfer", "transfer", "A region, its tubes, and who is let in at other strengths."
+            ),
+        ),
+    ),
+    (
+        "A joint that will not push",
+        section_controls.section,
+        (
+            Figure(
+                "control_limits",
+                "control_limits",
+                "Limits of controls: found where there are some, and imagined where not.",
             ),
         ),
     ),

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-from constraint_studies import soft_tables, transfer_tables
+from constraint_studies import control_tables, soft_tables, transfer_tables
 
-from paper_figures.report import section_soft, section_transfer
+from paper_figures.report import section_controls, section_soft, section_transfer
 from paper_figures.report.study_tables import Missing, Results
 
 
@@ -25,6 +25,27 @@ def test_how_often_weights_are_in_their_intervals(tmp_path: Path) -> None:
     assert "| C2 | 30 | 16 | 16.8 [16.4, wall] |" in text
     with pytest.raises(Missing):
         section_soft.section(Results(tmp_path / "elsewhere"))
+
+
+def test_when_a_limit_is_found_and_how_often_one_is_imagined(tmp_path: Path) -> None:
+    tables = control_tables()
+    text = section_controls.section(results(tmp_path, "control_limits", tables))
+    free, weak, weaker = (line for line in text.splitlines() if line.startswith("- "))
+    assert free == (
+        "- **No limit.** Some range is the answer with the model's chances in up to 50 % [45, 55 "
+        "%] of sets, of 1, and in 2 % [0, 8 %] of those of 20; with calibrated chances in up to "
+        "10 % [5, 15 %] of sets, of 1, and in 0 % [0, 6 %] of those of 20."
+    )
+    # 1 - 0.3 / 3 is 90 %.
+    assert "u at most 1 rad/s².** The truth is first in 90 % of sets from 3 demonstr" in weak
+    assert "u at least -0.5 rad/s²." in weaker
+    assert "with no number that was tried" in weaker
+    assert "| at most 1 | calibrated | 10 | 97 % [92, 100 %] | 50 % [45, 55 %] | 1 %" in text
+    assert "| no limit | the model's | 1 | - | - | 50 % [45, 55 %] |" in text
+    limits = tables["cases"].query("truth != 'none'")
+    some = results(tmp_path / "some", "control_limits", {**tables, "cases": limits})
+    with pytest.raises(Missing, match="cannot be read: it compares truths"):
+        section_controls.section(some)
 
 
 def test_what_is_let_in_and_what_is_refused(tmp_path: Path) -> None:

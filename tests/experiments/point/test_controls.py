@@ -1,0 +1,102 @@
+"""Ranges of controls of tiny points: limited demonstrators, tables, calibration and stages."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from tiny_point import TINY, composed, computed
+
+from experiments.collate.intervals import control_curve
+from experiments.config.read import read_config
+from experiments.config.settings import Settings
+from experiments.point import controls, trials
+from experiments.point.inference import infer_point
+from experiments.tracking.store import Store
+from experiments.tracking.trees import canonical_json
+
+# The cart pushes no harder than 0.4 m/s^2, of 1.
+WEAK = ("truth=none", "truth.name=weak", "truth.controls=[{lower: [0.4], upper: [null]}]")
+ASKED = ("system=double_integrator", "hypotheses.controls.shares=[0.4,0.8]", "actions=6")
+TASKS = ("demonstrations.pairs=12", "demonstrations.keep=8", "tasks.upper=[null,0.5]")
+
+
+def settings_of(*words: str) -> Settings:
+    return read_config(composed(*TINY[1:], *ASKED, *TASKS, *words))[0]
+
+
+def test_demonstrators_keep_to_the_limit_and_rule_breakers_do_not(tmp_path: Path) -> None:
+    limited, free, broken = (
+        trials.demonstrations(settings_of(*words), Store(tmp_path))
+        for words in (WEAK, ("truth=none",), (*WEAK, "demonstrations.rule_breaking=0.5"))
+    )
+    assert np.max(free.controls) > 0.6
+    assert np.max(limited.controls) == 0.4  # clipped to it, and not beyond
+    assert np.min(limited.controls) < -0.6
+    np.testing.assert_array_equal(limited.starts, free.starts)
+    breaks = broken.rule_breaking
+    assert 0 < breaks.sum() < len(breaks)
+    np.testing.assert_array_equal(broken.controls[breaks], free.controls[breaks])
+    np.testing.assert_array_equal(broken.controls[~breaks], limited.controls[~breaks])
+
+
+def test_truth_of_controls_counts_for_demonstrations_alone() -> None:
+    one, other = settings_of(*WEAK), settings_of(*WEAK[:2], WEAK[2].replace("0.4", "0.5"))
+    inputs = [canonical_json(trials.demonstration_inputs(each, None)) for each in (one, other)]
+    assert inputs[0] != inputs[1]
+
+
+def test_tables_of_a_point(tmp_path: Path) -> None:
+    point = computed(settings_of(*WEAK), tmp_path)
+    ranked = pd.read_csv(point.folder / "controls.csv")
+    assert ranked["is_truth"].sum() == 1
+    assert ranked.loc[ranked["in_truth"], "name"].tolist() == [
+        "control 0 above 0.4",
+        "control 0 above 0.8",
+    ]
+    assert ranked["applied_by"].iloc[0] == 0
+    assert ranked.loc[ranked["gain"] == -np.inf, "posterior"].eq(0).all()
+    ranks = pd.read_csv(point.folder / "control_ranks.csv")
+    assert len(ranks) == 2 * 3  # sizes of subsets, subsets; one kind of evidence
+    assert ranks["calibrated"].eq(0).all()
+    both = ranks["demonstrations"] == 2
+    np.testing.assert_allclose(ranks.loc[both, "true_first"], ranks.loc[both, "rank"] == 1)
+    assert ranks["posterior"].between(0, 1).all()
+    assert not (ranks["wrong_sure"] & ~ranks["wrong"]).any()
+    curve = control_curve(ranks.astype({"truth": str}))
+    assert curve["demonstrations"].tolist() == [1, 2]
+    assert curve["posterior"].iloc[0] == pytest.approx(ranks.loc[~both, "posterior"].mean())
+    log = (point.folder / "log.txt").read_text()
+    assert "controls" in log
+    assert "at most one range is forbidden" in " ".join(log.split())
+
+
+def test_wrong_answers_where_nothing_is_forbidden(tmp_path: Path) -> None:
+    point = infer_point(settings_of("truth=none"), Store(tmp_path))
+    assert point.controls is not None
+    never = dataclasses.replace(point.controls, applied=np.zeros_like(point.controls.applied))
+    settings, rng = settings_of("truth=none"), np.random.default_rng(0)
+    ranks = controls.control_tables(settings, never, rng)["control_ranks"]
+    assert ranks.loc[ranks["demonstrations"] == 2, "wrong"].eq(1).all()
+    assert ranks["rank"].isna().all()
+    assert ranks["true_first"].isna().all()
+    always = dataclasses.replace(never, applied=~never.applied)
+    ranks = controls.control_tables(settings, always, rng)["control_ranks"]
+    assert ranks["wrong"].eq(0).all()
+    assert ranks["first"].eq("").all()
+    assert ranks["none"].eq(1).all()
+
+
+def test_chances_are_calibrated_by_demonstrators_whom_nothing_limits(tmp_path: Path) -> None:
+    store, settings = Store(tmp_path), settings_of(*WEAK, "inference.calibrate=true")
+    inferred = infer_point(settings, store).controls
+    assert inferred is not None
+    assert inferred.calibration is not None
+    other = settings_of("truth=none", "inference.calibrate=true")
+    assert infer_point(other, store).controls.calibration == inferred.calibration  # stored
+    tables = controls.control_tables(settings, inferred, np.random.default_rng(0))
+    plain, mapped = (part for _, part in tables["control_ranks"].groupby("calibrated"))
+    assert mapped["none"].mean() > plain["none"].mean()  # so coarse a model says too much
