@@ -135,6 +135,50 @@ def test_the_temperature_is_told_on_demand(recorded: Path) -> None:
     assert estimate["lower"] <= estimate["temperature"] <= estimate["upper"]
 
 
+def test_controls_and_sets_are_told_on_demand(recorded: Path) -> None:
+    coarse = ("demonstrations=recorded", "grid=100", "dt=0.5", "inference.sets.largest=2")
+    asked = "hypotheses.controls.ranges=[{lower: [1.4], upper: [null]}]"
+    done = infer(recorded, *coarse, asked, "hypotheses.controls.shares=[0.25]")
+    assert done.returncode == 0, done.stderr
+    words = " ".join(done.stdout.split())
+    assert "assumed at most one range is forbidden, and no region" in words
+    folder = saved(recorded)
+    table = pd.read_csv(folder / "controls.csv")
+    record = json.loads((folder / "answer.json").read_text())["controls"]
+    assert [each["name"] for each in record["ranges"]] == table["name"].tolist()
+    above = next(each for each in record["ranges"] if each["lower"] == [1.4])
+    assert above["upper"] == [None]
+    # Applied where the recorded controls say so, as a mean over a time step.
+    applied = 0
+    for path in (recorded / "recorded").iterdir():
+        controls = pd.read_csv(path)["control_1"].dropna().to_numpy()
+        means = np.convolve(controls, np.full(25, 1 / 25), "valid")
+        applied += bool(np.max(means) > 1.4 + 0.02 * 4)
+    assert above["applied_by"] == applied
+    page = (folder / "page.html").read_text()
+    assert "If several regions may be avoided at once, the likeliest answer is" in page
+    assert "That takes for granted: at most one range is forbidden" in page
+    assert "Controls" in page
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("hypotheses.controls=[0.5]", "hypotheses.controls"),
+        ("hypotheses.controls.shares=[2.0]", "hypotheses.controls.shares[0]: 2.0 must be below 1"),
+        ("hypotheses.controls.ranges=[{lower: [0.5, 1], upper: [null]}]", "entries, one a control"),
+        ("hypotheses.controls.ranges=[{lower: [0.6], upper: [0.9]}]", "none of the 9 actions"),
+    ],
+)
+def test_ranges_of_controls_that_cannot_be_are_refused_at_once(
+    tmp_path: Path, word: str, message: str
+) -> None:
+    done = infer(tmp_path, "demonstrations=nowhere", word)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (tmp_path / "results").exists()
+
+
 def test_soft_or_hard_is_told_on_demand(recorded: Path) -> None:
     coarse = ("demonstrations=recorded", "grid=100", "dt=0.5", "inference.calibrate=false")
     done = infer(recorded, *coarse, "soft=2")
