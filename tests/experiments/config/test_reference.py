@@ -46,6 +46,7 @@ def test_tables_have_a_row_for_every_value_with_its_unit_and_default() -> None:
             is_group = any(other.startswith(f"{key}.") for other in field_keys(kind))
             kinds = ("boxes", "balls", "half_spaces", "shapes")
             lists = [f"{group}.{of}." for group in ("truth", "hypotheses") for of in kinds]
+            lists += ["truth.controls.", "hypotheses.controls.ranges."]
             inside = key.startswith((*lists, "goal.", "next_tasks.box."))
             if not is_group and not inside:
                 assert f"| `{key}` | " in text, (command, key)
