@@ -14,7 +14,14 @@ from tiny_point import composed, planned
 
 from experiments.config.paths import CONF
 from experiments.config.read import ConfigError, plain_tree, read_config
-from experiments.config.settings import BallSettings, HalfSpaceSettings, Region, ShapeSettings
+from experiments.config.settings import (
+    BallSettings,
+    ControlHypothesesSettings,
+    ControlRange,
+    HalfSpaceSettings,
+    Region,
+    ShapeSettings,
+)
 
 
 def options(group: str) -> list[str]:
@@ -122,8 +129,10 @@ def test_every_setting_changes_identity() -> None:
         "half_spaces": (HalfSpaceSettings((0.0, 1.0), 5.0),),
         "shapes": (ShapeSettings("own.ring", {"width": 1.0}),),
     }
-    truth = dataclasses.replace(settings.truth, **kinds)
-    hypotheses = dataclasses.replace(settings.hypotheses, **kinds)
+    limits = (ControlRange((0.5,), (None,)),)
+    controls = ControlHypothesesSettings(limits, (0.5,), 0.02)
+    truth = dataclasses.replace(settings.truth, **kinds, controls=limits)
+    hypotheses = dataclasses.replace(settings.hypotheses, **kinds, controls=controls)
     settings = dataclasses.replace(settings, truth=truth, hypotheses=hypotheses)
     others = list(changed(settings))
     assert len(others) > 30
