@@ -8,7 +8,7 @@ import numpy as np
 import scipy  # loads scipy.special when it is first used
 from numpy.typing import ArrayLike
 
-from mlci.evidence import posterior, rank_scores
+from mlci.evidence import posterior
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 
 
@@ -70,26 +70,27 @@ def random_subsets(
     return [orders[:, :size] for size in range(1, min(largest, population) + 1)]
 
 
-def truth_ranks(gains: Floats, truth: Bools) -> Floats:
-    """Rank of the truth by the gains of each of B rankings, the measure of Fig. 5.
+def truth_ranks(ranks: Floats, truth: Bools) -> Floats:
+    """Rank of the truth in each of B rankings, the measure of Fig. 5.
 
     Args:
-        gains: (B, C) [nat], such as of random subsets of demonstrations.
+        ranks: (B, C) from 1, such as of random subsets of demonstrations; see
+            `mlci.evidence.rank_scores`.
         truth: (C,) which hypotheses the true constraint covers; the best ranked one counts.
 
     Returns:
         (B,) ranks from 1; ties share their mean rank. NaN if the truth covers no hypothesis.
     """
     if not np.any(truth):
-        return np.full(len(gains), np.nan)
-    return np.asarray(np.min(rank_scores(gains, gains > -np.inf)[:, truth], axis=1))
+        return np.full(len(ranks), np.nan)
+    return np.asarray(np.min(ranks[:, truth], axis=1))
 
 
-def top_chances(gains: Floats, good: Bools, top: int) -> Floats:
+def top_chances(ranks: Floats, good: Bools, top: int) -> Floats:
     """Whether the `top` best hypotheses of each ranking are all good, the measure of Fig. 7.
 
     Args:
-        gains: (B, C) as for `truth_ranks`.
+        ranks: (B, C) as for `truth_ranks`.
         good: (C,) which hypotheses count, such as those that overlap the truth.
         top: how many of the best there must be.
 
@@ -97,9 +98,8 @@ def top_chances(gains: Floats, good: Bools, top: int) -> Floats:
         (B,) 1 or 0; between them where the last places are tied: the chance that all are good if
         the tie is broken at random.
     """
-    rank = rank_scores(gains, gains > -np.inf)
-    last = np.sort(rank, axis=1)[:, [top - 1]]
-    before, tied = rank < last, rank == last
+    last = np.partition(ranks, top - 1, axis=1)[:, [top - 1]]
+    before, tied = ranks < last, ranks == last
     places = top - np.sum(before, axis=1)
     fitting, all_ways = (
         scipy.special.comb(np.sum(part, axis=1), places) for part in (tied & good, tied)
@@ -113,7 +113,7 @@ def claims(gains: Floats, prior_none: float) -> Floats:
     Beside the share of rankings whose best hypothesis is the truth, it says how sure is too sure.
 
     Args:
-        gains: (B, C) as for `truth_ranks`.
+        gains: (B, C) [nat], such as of random subsets of demonstrations.
         prior_none: prior probability that there is no constraint.
     """
     return np.asarray(np.max(posterior(gains, prior_none)[0], axis=1))

@@ -10,7 +10,7 @@ from experiments.config.settings import Settings
 from experiments.point.truth_tables import region_table
 from mlci.best_areas import area_scores
 from mlci.credible_sets import neighbours
-from mlci.evidence import prior_shares, total_gain
+from mlci.evidence import prior_shares, rank_scores, total_gain
 from mlci.inference import UNAVOIDABLE, Inference
 from mlci.metrics import claims, random_subsets, top_chances, truth_ranks
 from mlci.planes import planes
@@ -35,36 +35,28 @@ def rank_table(settings: Settings, inference: Inference, rng: np.random.Generato
     good = {"overlap": hypotheses.overlaps(constraint), "inside": truth}
     compared = [top for top in BEST if top <= len(hypotheses)] if len(constraint) else []
     ranks, touching = settings.ranks, neighbours(hypotheses)
-    rows = []
-    for subsets in random_subsets(len(inference.names), ranks.demonstrations, ranks.subsets, rng):
-        gains = _gains(inference, subsets)
-        rank = truth_ranks(gains, truth)
-        area = vars(area_scores(gains, touching, good["overlap"]))
-        in_top = (rank <= ranks.top).astype(int) if truth.any() else np.nan
-        rows.append(
-            pd.DataFrame(
-                {
-                    "demonstrations": subsets.shape[1],
-                    "subset": np.arange(len(subsets)),
-                    "reachable": np.sum(inference.reachable[subsets], axis=1),
-                    "rank": rank,
-                    f"share_top_{ranks.top}": in_top,
-                    **{
-                        f"top_{top}_{name}": top_chances(gains, which, top)
-                        if top in compared
-                        else np.nan
-                        for name, which in good.items()
-                        for top in BEST
-                    },
-                    **{
-                        f"area_{name}": values if compared else np.nan
-                        for name, values in area.items()
-                    },
-                    "claim": claims(gains, inference.prior_none),
-                }
-            )
-        )
-    return pd.concat(rows, ignore_index=True)
+    sizes = random_subsets(len(inference.names), ranks.demonstrations, ranks.subsets, rng)
+    gains = np.concatenate([_gains(inference, subsets) for subsets in sizes])
+    places = rank_scores(gains, gains > -np.inf)
+    rank = truth_ranks(places, truth)
+    area = vars(area_scores(gains, touching, good["overlap"]))
+    reachable = [np.sum(inference.reachable[subsets], axis=1) for subsets in sizes]
+    return pd.DataFrame(
+        {
+            "demonstrations": np.repeat(1 + np.arange(len(sizes)), ranks.subsets),
+            "subset": np.tile(np.arange(ranks.subsets), len(sizes)),
+            "reachable": np.concatenate(reachable),
+            "rank": rank,
+            f"share_top_{ranks.top}": (rank <= ranks.top).astype(int) if truth.any() else np.nan,
+            **{
+                f"top_{top}_{name}": top_chances(places, which, top) if top in compared else np.nan
+                for name, which in good.items()
+                for top in BEST
+            },
+            **{f"area_{name}": values if compared else np.nan for name, values in area.items()},
+            "claim": claims(gains, inference.prior_none),
+        }
+    )
 
 
 def _gains(inference: Inference, subsets: Ints) -> Floats:

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from mlci.evidence import log_evidence, posterior, rank_constraints, total_gain
+from mlci.evidence import log_evidence, posterior, rank_constraints, rank_scores, total_gain
 from mlci.metrics import (
     claims,
     final_state_error,
@@ -49,6 +49,11 @@ def test_violation_distance_by_hand() -> None:
     assert distance.pooled == pytest.approx(0.2 + 0.5)
 
 
+def ranks_of(gains: np.ndarray) -> np.ndarray:
+    """(B, C) where each hypothesis is in each of B rankings."""
+    return rank_scores(gains, gains > -np.inf)
+
+
 def test_random_subsets_are_nested_and_distinct() -> None:
     subsets = random_subsets(8, 20, 5, np.random.default_rng(0))
     assert [part.shape for part in subsets] == [(5, size) for size in range(1, 9)]
@@ -58,7 +63,7 @@ def test_random_subsets_are_nested_and_distinct() -> None:
 
 
 def test_a_truth_that_covers_no_hypothesis_has_no_rank() -> None:
-    ranks = truth_ranks(np.array([[0.2, -np.inf]]), np.array([False, False]))
+    ranks = truth_ranks(np.array([[1.0, 2.0]]), np.array([False, False]))
     assert np.isnan(ranks).tolist() == [True]
 
 
@@ -68,7 +73,8 @@ def test_truth_ranks_equal_ranking_each_subset_alone() -> None:
     violated = rng.random((12, 7)) < 0.05
     truth = np.array([False, True, False, False, True, False, False])
     for subsets in random_subsets(12, 6, 9, rng):
-        ranks = truth_ranks(total_gain(log_evidence(1 - phi, violated)[subsets]), truth)
+        gains = total_gain(log_evidence(1 - phi, violated)[subsets])
+        ranks = truth_ranks(ranks_of(gains), truth)
         alone = [rank_constraints(1 - phi[s], violated[s]).rank[truth].min() for s in subsets]
         np.testing.assert_array_equal(ranks, alone)
 
@@ -83,14 +89,14 @@ def test_top_chances_by_hand() -> None:
         ([True, True, False], [1.0, 0.5, 1.0]),
         ([False, False, True], [0.0, 0.5, 0.0]),
     ):
-        found = [top_chances(each, np.array(good), 1) for each in both]
+        found = [top_chances(ranks_of(each), np.array(good), 1) for each in both]
         np.testing.assert_allclose(np.concatenate(found), chances)
     for good, chances in (
         ([True, True, False], [1.0, 0.0, 0.0]),
         ([True, False, True], [0.0, 0.0, 0.0]),
         ([False, True, True], [0.0, 1.0, 1.0]),
     ):
-        found = [top_chances(each, np.array(good), 2) for each in both]
+        found = [top_chances(ranks_of(each), np.array(good), 2) for each in both]
         np.testing.assert_allclose(np.concatenate(found), chances)
 
 
@@ -118,7 +124,8 @@ def test_top_chances_average_all_ways_to_break_ties(top: int) -> None:
                 merits = [merit(subset, i) for i in range(5)]
                 ranked = [sorted(order, key=merits.__getitem__, reverse=True) for order in orders]
                 expected.append(np.mean([good[best[:top]].all() for best in ranked]))
-            found = top_chances(total_gain(log_evidence(1 - phi, violated)[subsets]), good, top)
+            gains = total_gain(log_evidence(1 - phi, violated)[subsets])
+            found = top_chances(ranks_of(gains), good, top)
             np.testing.assert_allclose(found, expected, atol=1e-12)
             seen += expected
     assert (top == 5) == (max(seen) == 0)
@@ -141,5 +148,5 @@ def test_gains_that_differ_by_rounding_share_the_top() -> None:
     gains = np.array([[1.0, 1.0 + 4e-16, 1.0 - 2e-16, 0.0]])
     good = np.array([True, False, False, False])
     assert len(set(gains[0])) == 4
-    assert top_chances(gains, good, 1).tolist() == pytest.approx([1 / 3])
-    assert truth_ranks(gains, good).tolist() == [2.0]
+    assert top_chances(ranks_of(gains), good, 1).tolist() == pytest.approx([1 / 3])
+    assert truth_ranks(ranks_of(gains), good).tolist() == [2.0]

@@ -38,7 +38,7 @@ SMOKE = {
         *("scale=smoke", "safety.shape=[21,21,12]", "workers=1", "inference.calibrate=false"),
         *SMALL,
     ],
-    "mlci-infer": SMALL,
+    "mlci-infer": [*SMALL, "inference.calibrate=false"],
     "mlci-advise": [*SMALL, "grids=[[8,8,8]]", "dts=[1.0]", "pairs=4", "remedy=1"],
     "mlci-figures": ["--jobs", "1"],
 }
