@@ -27,7 +27,7 @@ from experiments.tracking.store import Store
 from mlci.actuation.inference import ControlInference, calibrate_controls, infer_controls
 from mlci.actuation.ranges import ControlRanges
 from mlci.demonstrations import Demonstration
-from mlci.evidence import posterior, total_gain
+from mlci.evidence import posterior, rank_scores, total_gain
 from mlci.forecasts import ForecastMap
 from mlci.json_numbers import finite
 from mlci.metrics import random_subsets, truth_ranks
@@ -98,7 +98,8 @@ def control_tables(
             gains = total_gain(kind.evidence[subsets])
             each, none = posterior(gains, kind.prior_none)
             first, best = np.argmax(gains, axis=1), np.max(each, axis=1)
-            rank, wrong = truth_ranks(gains, is_truth), ~in_truth[first] & (best > none)
+            rank = truth_ranks(rank_scores(gains, gains > -np.inf), is_truth)
+            wrong = ~in_truth[first] & (best > none)
             part = {
                 "demonstrations": subsets.shape[1],
                 "subset": np.arange(len(subsets)),
