@@ -10,11 +10,9 @@ import pandas as pd
 import pytest
 
 from experiments.config.settings import (
-    HypothesesSettings,
     RankSettings,
     Region,
     Settings,
-    TruthSettings,
 )
 from experiments.point.ranking_tables import rank_table
 from experiments.point.run import run_point
@@ -28,7 +26,8 @@ SHARES = [f"top_{top}_{name}" for top in (1, 2) for name in ("overlap", "inside"
 
 def walled(settings: Settings, low: float, high: float, keep: int = 8) -> Settings:
     """Ten hypotheses, 0.6 m wide from -3 m on, and a wall where it is told to be."""
-    truth = TruthSettings(
+    truth = dataclasses.replace(
+        settings.truth,
         boxes=(Region((low, None), (high, None)),),
         balls=(),
         half_spaces=(),
@@ -75,13 +74,13 @@ def test_shares_are_of_rankings_whose_best_meet_the_truth(settings: Settings) ->
 def test_no_truth_and_too_few_hypotheses_have_no_shares(settings: Settings) -> None:
     free = dataclasses.replace(
         settings,
-        truth=TruthSettings(boxes=(), balls=(), half_spaces=(), shapes=(), name="none", cell=None),
+        truth=dataclasses.replace(settings.truth, boxes=(), name="none"),
     )
     phi, violated = np.full((3, 10), 0.5), np.zeros((3, 10), dtype=bool)
     rows = rank_table(free, inference(free, phi, violated), np.random.default_rng(0))
     assert rows[SHARES].isna().all(axis=None)
     wide = Region((0.6, None), (1.2, None))
-    alone = HypothesesSettings(boxes=(wide,), balls=(), half_spaces=(), shapes=(), shape=None)
+    alone = dataclasses.replace(settings.hypotheses, boxes=(wide,), shape=None)
     alone = dataclasses.replace(settings, hypotheses=alone)
     of_one = inference(alone, phi[:, :1], violated[:, :1])
     rows = rank_table(alone, of_one, np.random.default_rng(0))
