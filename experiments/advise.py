@@ -20,12 +20,14 @@ from experiments.app import DONE, FAILED, run_command
 from experiments.config.read import ConfigError, read_advice_config
 from experiments.config.settings import AdviceSettings
 from experiments.console import noise_words
+from experiments.success_rule import SuccessRule, chance_word, chance_words, read_rule
 from experiments.terminal import entry, table_lines, terminal_width, words
-from mlci.demonstrations import Task
+from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
-from mlci.diagnosis import MOST_UNREACHABLE, Diagnosis, diagnose
+from mlci.diagnosis import MOST_UNREACHABLE, Diagnosis
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
+from mlci.outlook.outlook import Outlook, outlook
 from mlci.spaces import Bools
 from mlci.tabular import discretize
 
@@ -48,6 +50,7 @@ class Candidate:
         diagnosis: how it moves.
         reached: (P,) which tasks' goals the tabular agent can reach.
         coarse: whether its cells are wider than half a hypothesis.
+        known: what is known of inference in it before anybody demonstrates; None if nothing.
         discretize_s: processor time that it took to form [s].
         task_s: processor time that the inference of one task takes [s].
     """
@@ -60,6 +63,7 @@ class Candidate:
     coarse: bool
     discretize_s: float
     task_s: float
+    known: Outlook | None = None
 
     @property
     def moves(self) -> int:
@@ -95,16 +99,16 @@ def main() -> int:
 
 def advise(settings: AdviceSettings, log: Callable[[str], None]) -> int:
     """Try the discretisations, print what was found and recommend one; returns the exit status."""
-    tasks = _tasks(settings)
+    paths = _paths(settings)
     text = (
-        f"{len(tasks)} of {settings.pairs} that were drawn, {settings.horizon:g} s each: those "
+        f"{len(paths)} of {settings.pairs} that were drawn, {settings.horizon:g} s each: those "
         "whose cheapest path keeps within the ranges of states and controls, so that a good "
         "tabular agent can do them"
     )
     for line in entry("tasks", text):
         log(line)
-    candidates = list(_try_all(settings, tasks))
-    for line in table_lines([_HEAD, *(_row(each) for each in candidates)], terminal_width()):
+    candidates, rule = list(_try_all(settings, paths)), read_rule()
+    for line in table_lines([_HEAD, *(_row(each, rule) for each in candidates)], terminal_width()):
         log(line)
     for title, text in _COLUMNS.items():
         for line in entry(title, text):
@@ -123,6 +127,9 @@ def advise(settings: AdviceSettings, log: Callable[[str], None]) -> int:
     )
     for reason in reasons:
         for line in entry("", reason):
+            log(line)
+    if chosen.known is not None:
+        for line in entry("works", " ".join(chance_words(chosen.known, rule))):
             log(line)
     return DONE
 
@@ -164,8 +171,9 @@ def recommend(candidates: Sequence[Candidate]) -> tuple[Candidate | None, list[s
     return chosen, reasons
 
 
-def _tasks(settings: AdviceSettings) -> list[Task]:
-    """Tasks from the task box that can be done: whether a grid can do them is then its merit.
+def _paths(settings: AdviceSettings) -> list[Demonstration]:
+    """Optimal paths of tasks from the task box that can be done: whether a grid can do them is then
+    its merit.
 
     Raises:
         ConfigError: there is none.
@@ -182,7 +190,7 @@ def _tasks(settings: AdviceSettings) -> list[Task]:
         goal_offsets=settings.tasks.goal_offsets,
     )
     done = [
-        attempt.demonstration.task
+        attempt.demonstration
         for attempt in demonstrate(system, drawn, None, None, dt=settings.horizon / _SAMPLES)
         if attempt.outcome is Outcome.KEPT
         and attempt.demonstration.controls is not None
@@ -197,14 +205,14 @@ def _tasks(settings: AdviceSettings) -> list[Task]:
     return done
 
 
-def _try_all(settings: AdviceSettings, tasks: Sequence[Task]) -> Iterator[Candidate]:
+def _try_all(settings: AdviceSettings, paths: Sequence[Demonstration]) -> Iterator[Candidate]:
     """Every grid and time step; where the centres of the cells fail, with the remedy as well."""
     todo = [(grid, dt, 1) for grid in settings.grids_to_try for dt in settings.dts]
     with tqdm(total=len(todo), unit="model", leave=False, disable=None) as bar:
         while todo:
             grid, dt, samples = todo.pop(0)
             bar.set_postfix_str(f"{grid.size} cells, dt {dt:g} s, samples {samples}")
-            candidate = _try(settings, grid, dt, samples, tasks)
+            candidate = _try(settings, grid, dt, samples, paths)
             yield candidate
             bar.update()
             moves = grid.size * len(settings.action_values) * settings.remedy ** len(grid.shape)
@@ -214,7 +222,7 @@ def _try_all(settings: AdviceSettings, tasks: Sequence[Task]) -> Iterator[Candid
 
 
 def _try(
-    settings: AdviceSettings, grid: Grid, dt: float, samples: int, tasks: Sequence[Task]
+    settings: AdviceSettings, grid: Grid, dt: float, samples: int, paths: Sequence[Demonstration]
 ) -> Candidate:
     """Form a tabular model and see what it can do."""
     before = time.process_time()
@@ -222,11 +230,11 @@ def _try(
         settings.model, grid, settings.action_values, dt, settings.candidates, samples
     )
     formed = time.process_time() - before
-    distributions = [TrajectoryDistribution.of_task(model, task) for task in tasks]
-    reached = np.array([each.is_possible for each in distributions])
+    known = outlook(model, paths)
     task_s = np.nan
-    if reached.any():
-        first = distributions[int(np.argmax(reached))]
+    if known.reachable.any():
+        task = paths[int(np.argmax(known.reachable))].task
+        first = TrajectoryDistribution.of_task(model, task)
         for _ in range(2):  # the second time without what all tasks share
             before = time.process_time()
             replace(first).violation_probabilities()
@@ -236,11 +244,12 @@ def _try(
         grid=grid,
         dt=dt,
         samples=samples,
-        diagnosis=diagnose(model),
-        reached=reached,
+        diagnosis=known.diagnosis,
+        reached=known.reachable,
         coarse=bool(np.any(grid.widths > widths / 2 * (1 + 1e-9))),
         discretize_s=formed,
         task_s=task_s,
+        known=known,
     )
 
 
@@ -250,15 +259,16 @@ _COLUMNS = {
     "cells/step": "crossed on average",
     "leave": "share of the moves that leave the state space",
     "noise": "control noise var(u) dt, of what it would be without limits",
+    "works": "how often the truth is among the first hypotheses, as foretold below",
     "form, task": "processor time to form the model, and to infer from a task",
 }
 _HEAD = (
     "grid", "states", "dt", "samples", "verdict", "goals", "frozen", "cells/step", "leave", "noise",
-    "form [s]", "task [ms]",
+    "works", "form [s]", "task [ms]",
 )  # fmt: skip
 
 
-def _row(candidate: Candidate) -> tuple[object, ...]:
+def _row(candidate: Candidate, rule: SuccessRule) -> tuple[object, ...]:
     """A candidate in the table."""
     found, names = candidate.diagnosis, candidate.grid.space.names
     worst = int(np.argmax(found.frozen))
@@ -276,6 +286,7 @@ def _row(candidate: Candidate) -> tuple[object, ...]:
         f"{found.cells_crossed:.1f}",
         f"{found.leave:.0%}",
         noise_words(found),
+        chance_word(candidate.known, rule),
         f"{candidate.discretize_s:.2g}",
         f"{1e3 * candidate.task_s:.2g}" if candidate.reached.any() else "-",
     )

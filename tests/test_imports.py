@@ -75,7 +75,11 @@ MLCI = {
     "mlci.joint_avoidance": "mlci.recursions",
     "mlci.worlds.fixed_horizon": "mlci.joint_avoidance mlci.worlds.tables",
     "mlci.best_areas": "mlci.evidence",
-    "mlci.planar_point": "mlci.systems",
+    "mlci.zoo": "mlci.systems",
+    "mlci.outlook": "",
+    "mlci.outlook.rule": "mlci.spaces",
+    "mlci.outlook.flow": "mlci.demonstrations mlci.grids mlci.systems",
+    "mlci.outlook.outlook": "mlci.diagnosis mlci.maxent mlci.outlook.flow",
     "mlci.sets.chains": "mlci.spaces",
     "mlci.sets.evidence": "mlci.inference mlci.maxent",
     "mlci.sets.posterior": "mlci.sets.chains mlci.sets.evidence",
@@ -159,6 +163,7 @@ ROOMS = {
     "experiments.point": f"{POINT} experiments.console experiments.terminal "
     "experiments.belief_lines",
     "experiments.collate": f"{TRACKING} experiments.terminal",
+    "experiments.collate.success_rule": "mlci.outlook experiments.collate",
     "experiments.sweep": f"{POINT} experiments.terminal experiments.point experiments.collate",
     "experiments.lookback": f"mlci {TRACKING} experiments.collate experiments.config.paths "
     "experiments.config.suggestions experiments.terminal",
@@ -172,6 +177,7 @@ ROOMS = {
     "experiments.infer": EVERYTHING,
     "experiments.infer_table": EVERYTHING,
     "experiments.advise": EVERYTHING,
+    "experiments.success_rule": EVERYTHING,
     "experiments.results": EVERYTHING,
 }
 

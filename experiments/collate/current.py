@@ -49,5 +49,5 @@ def is_current(points: Sequence[Point], folder: Path, *, mixed: bool = False) ->
         return False
     in_order = {identity: records[identity] for identity in listed.points}
     now = collated(in_order, listed.tables, listed.kept, made_of(records, study))
-    is_listed = now == listed and (mixed or len(now.sources) == 1)
+    is_listed = now == listed and (mixed or len(now.sources) <= len(now.systems))
     return is_listed and not changes.missing and not changes.damaged

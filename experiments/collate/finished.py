@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from experiments.terminal import counted
 from experiments.tracking.files import digest, read_file
-from experiments.tracking.points import Point
+from experiments.tracking.points import Point, system_module
 from experiments.tracking.trees import flatten
 
 if TYPE_CHECKING:
@@ -98,3 +99,29 @@ class FinishedPoint:
     def table_digest(self, name: str) -> str:
         """sha256 of a table as the point wrote it; empty if it wrote none."""
         return str(self.record["files"].get(f"{name}.csv", ""))
+
+
+def refuse_mixture(points: Sequence[FinishedPoint]) -> None:
+    """Raise unless all points of a system come from one version of the source; say which do not."""
+    by_source: dict[str, list[str]] = {}
+    versions: dict[str, set[str]] = {}
+    for point in points:
+        by_source.setdefault(point.record["source"], []).append(point.identity)
+        module = system_module(point.record["config"])
+        versions.setdefault(module, set()).add(point.record["source"])
+    if all(len(each) == 1 for each in versions.values()):
+        return
+    lines = [
+        f"  {source[:12]}: {counted(len(identities), 'point')}, such as {identities[0]}"
+        for source, identities in sorted(by_source.items(), key=lambda item: -len(item[1]))
+    ]
+    raise CollateError(
+        "\n".join(
+            [
+                "these points come from different versions of the source, and no table is "
+                "written; run the sweep again, or tell it to mix them with "
+                "sweep.mix_sources=true:",
+                *lines,
+            ]
+        )
+    )

@@ -23,10 +23,9 @@ from experiments.collate.chosen_tasks import chosen_tasks, early_overlap, unfoun
 from experiments.collate.current import made_of
 from experiments.collate.evidence_kinds import evidence_kinds
 from experiments.collate.examples import example_tables
-from experiments.collate.finished import CollateError, FinishedPoint
+from experiments.collate.finished import CollateError, FinishedPoint, refuse_mixture
 from experiments.collate.intervals import study_tables
 from experiments.collate.reliability import reliability
-from experiments.terminal import counted
 from experiments.tracking.files import (
     csv_bytes,
     digest,
@@ -69,7 +68,7 @@ def collate(
     """
     finished = sorted(map(FinishedPoint.read, points), key=_order)
     if not mixed:
-        _refuse_mixture(finished)
+        refuse_mixture(finished)
     study = whole_study(folder)
     tables = inner_path(folder.parent, folder.name, "tables")
     new = part_of(tables)  # a folder, which takes the place of the old one once all are whole
@@ -103,7 +102,8 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
     """The header of a table, then its rows, a part for each point.
 
     A table that opens with fewer columns than the others, such as one of the truth alone, is the
-    same for many points; of those that have it alike the first stands for all.
+    same for many points; of those that have it alike the first stands for all. Where points are of
+    several systems a table has the columns of each, and no value in those of the others.
 
     Args:
         name: the table.
@@ -113,6 +113,8 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
         CollateError: a point lacks the table, or has other columns than the first.
     """
     columns = points[0].columns(name)
+    if several := len({point.config["system.target"] for point in points}) > 1:
+        columns = list(dict.fromkeys(each for point in points for each in point.columns(name)))
     opening = list(takewhile(points[0].opening.__contains__, columns))
     groups = [[point] for point in points]
     if len(opening) < len(points[0].opening):
@@ -123,12 +125,25 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
     extra = _extra_columns(groups, opening)
     yield csv_bytes(pd.DataFrame(columns=[*extra, *columns]))
     for point, *_ in groups:
-        if (own := point.columns(name)) != columns:
+        front = {key: point.config.get(key, "") for key in extra}
+        own = point.columns(name)
+        if several and own != columns:
+            yield _filled(point, name, front, columns)
+            continue
+        if own != columns:
             raise CollateError(
                 f"the columns of {point.folder / name}.csv are {','.join(own)}, "
                 f"not {','.join(columns)}"
             )
-        yield _opened(point, name, {key: point.config.get(key, "") for key in extra})
+        yield _opened(point, name, front)
+
+
+def _filled(
+    point: FinishedPoint, name: str, front: Mapping[str, Any], columns: Sequence[str]
+) -> bytes:
+    """The rows of a point's table with the columns of all, empty where it has none."""
+    table = point.table(name).reindex(columns=list(columns), fill_value="")
+    return csv_bytes(pd.DataFrame({**front, **table}, index=table.index), header=False)
 
 
 def _opened(point: FinishedPoint, name: str, front: Mapping[str, Any]) -> bytes:
@@ -166,6 +181,10 @@ def _made_tables(
         if len(table):
             made["chosen_tasks"], made["unfound"] = chosen_tasks(table), unfound(table)
             made["early_overlap"] = early_overlap(table)
+    if "dynamics" in joined:
+        from experiments.collate.success_rule import success_tables  # knows mlci: not light
+
+        made |= success_tables(pd.read_csv(joined["dynamics"]))
     cases = case_table(joined["summary"], [point.identity for point in points], names)
     return made if cases is None else {**made, "cases": cases}
 
@@ -211,29 +230,6 @@ def _publish(new: Path, tables: Path, former: set[str]) -> None:
     for path in new.iterdir() if new.exists() else ():
         if path.name not in former and not (tables / path.name).exists():
             path.rename(tables / path.name)
-
-
-def _refuse_mixture(points: Sequence[FinishedPoint]) -> None:
-    """Raise unless all points come from one version of the source; say which do not."""
-    by_source: dict[str, list[str]] = {}
-    for point in points:
-        by_source.setdefault(point.record["source"], []).append(point.identity)
-    if len(by_source) == 1:
-        return
-    lines = [
-        f"  {source[:12]}: {counted(len(identities), 'point')}, such as {identities[0]}"
-        for source, identities in sorted(by_source.items(), key=lambda item: -len(item[1]))
-    ]
-    raise CollateError(
-        "\n".join(
-            [
-                "these points come from different versions of the source, and no table is "
-                "written; run the sweep again, or tell it to mix them with "
-                "sweep.mix_sources=true:",
-                *lines,
-            ]
-        )
-    )
 
 
 def _extra_columns(groups: Sequence[Sequence[FinishedPoint]], opening: Sequence[str]) -> list[str]:

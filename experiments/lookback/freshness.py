@@ -65,7 +65,7 @@ def table_concerns(study: Study, points: Sequence[Facts]) -> list[str]:
             concerns.append("points have run again since")
         elif collated.made_of != made_of(records, study):
             concerns.append("the study's last sweep was stopped before it wrote them")
-    if len(collated.sources) > 1:
+    if len(collated.sources) > len(collated.systems):  # a system brings source of its own
         concerns.append(f"they mix {len(collated.sources)} versions of the source")
     if collated.points and collated.made_by != table_source():
         concerns.append("the code that makes them of points, or a package, has changed since")

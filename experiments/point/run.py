@@ -15,6 +15,7 @@ from experiments.console import (
     measure_lines,
     trial_lines,
 )
+from experiments.point.dynamics_tables import dynamics_table
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
 from experiments.point.tables import point_tables
@@ -36,7 +37,7 @@ def run_point(
 
     Returns:
         Tables by name, see `experiments.point.tables.point_tables`; if asked for,
-        those of `transfer_tables`.
+        those of `transfer_tables` and `dynamics_table`.
     """
     begin("ranking hypotheses")
     inferred = infer_point(settings, store)
@@ -65,6 +66,9 @@ def run_point(
     if settings.transfer.strengths:
         begin("with stronger and weaker controls")
         tables |= transfer_tables(settings, inferred, store)
+    if settings.dynamics.tasks:
+        begin("what was known before")
+        tables["dynamics"] = dynamics_table(settings, inferred, measures, tables["ranks"], store)
     begin("")
     for line in measure_lines(tables["summary"].iloc[0], tables["ranks"], top):
         log(line)

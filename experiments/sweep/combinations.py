@@ -88,7 +88,7 @@ class Combinations:
         Raises:
             ConfigError: something cannot be read, or cannot be swept.
         """
-        cases = read_cases(self.settings, self.cases)
+        cases = read_cases(self._study_settings(), self.cases)
         typed = parser.parse_overrides(list(arguments))
         typed_keys = {override.key_or_group for override in typed}
         values: dict[str, list[str]] = {}
@@ -112,6 +112,16 @@ class Combinations:
             for job in itertools.product(*values.values())
             for overrides in combinations
         ]
+
+    def _study_settings(self) -> object:
+        """The study's settings; the first and the last, if each has a system and ends are taken."""
+        lists = _plain(self.settings)
+        if not (self.ends and isinstance(lists, list) and len(lists) > 2):
+            return self.settings
+        if not all(any(str(word).startswith("system=") for word in words) for words in lists):
+            return self.settings
+        self.notes.append(f"settings: the first and the last stand for all {len(lists)} systems")
+        return [lists[0], lists[-1]]
 
     def _combinations_of(
         self, case: Case, parser: OverridesParser, typed_keys: set[str]

@@ -4,6 +4,7 @@ from experiments.config.settings.advice import AdviceSettings
 from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
 from experiments.config.settings.controls import ControlHypothesesSettings, ControlRange
+from experiments.config.settings.dynamics import DynamicsSettings
 from experiments.config.settings.kinds import ESTIMATE
 from experiments.config.settings.parts import (
     NO_TRUTH,
@@ -46,6 +47,7 @@ __all__ = [
     "ControlHypothesesSettings",
     "ControlRange",
     "DemonstrationSettings",
+    "DynamicsSettings",
     "GridSettings",
     "HalfSpaceSettings",
     "HypothesesSettings",

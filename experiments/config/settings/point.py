@@ -14,6 +14,7 @@ from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
 from experiments.config.settings.constraint import SoftSettings, TransferSettings
 from experiments.config.settings.controls import ranges_of
+from experiments.config.settings.dynamics import DynamicsSettings
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
@@ -137,6 +138,7 @@ class Settings(ModelSettings):
     areas: AreaSettings
     soft: SoftSettings
     transfer: TransferSettings
+    dynamics: DynamicsSettings
     rollouts: Annotated[
         CountOrNone,
         about(

@@ -46,6 +46,16 @@ def companions(option: str) -> list[str]:
             word = f"truth={truth.stem}"
             if composed(word).hydra.runtime.choices[group] == name:
                 return [word]
+        return [word for word in _subject_of(group, name) if word != option] + ["truth=cell"]
+    return []
+
+
+def _subject_of(group: str, name: str) -> list[str]:
+    """The system without a truth of its own that brings a grid, or is the one that is named."""
+    for path in sorted((CONF / "system").glob("*.yaml")):
+        word = f"system={path.stem}"
+        if composed(word).hydra.runtime.choices[group] == name:
+            return [word]
     return []
 
 

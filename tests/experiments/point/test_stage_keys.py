@@ -113,6 +113,7 @@ CHANGES = {
     "transfer.strengths": ("transfer.strengths=[2.0]", NOTHING),
     "transfer.trials": ("transfer.trials=7", NOTHING),
     "transfer.states": ("transfer.states=7", NOTHING),
+    "dynamics.tasks": ("dynamics.tasks=7", NOTHING),
     "rollouts": ("rollouts=3", NOTHING),
     "misfit": ("misfit=99", NOTHING),
     "seed": ("seed=1", REAL),

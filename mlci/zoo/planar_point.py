@@ -9,6 +9,7 @@ import numpy as np
 
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import System
+from mlci.zoo.parts import batch_of, limited_space, require_positive, symmetric_box
 
 
 @dataclass(frozen=True)
@@ -30,25 +31,20 @@ class PlanarPoint(System):
     speed_limit: float = 2.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"PlanarPoint.{name} must be positive, not {value}")
+        require_positive(self)
 
     @cached_property
     def space(self) -> StateSpace:
-        upper = np.full(2, self.position_limit)
-        return StateSpace(Box(-upper, upper), np.array([False, False]), ("x", "y"), ("m", "m"))
+        return limited_space(("x", "y"), ("m", "m"), (self.position_limit,) * 2)
 
     @cached_property
     def control_box(self) -> Box:
-        upper = np.full(2, self.speed_limit)
-        return Box(-upper, upper)
+        return symmetric_box(self.speed_limit, self.speed_limit)
 
     def dynamics(self, states: Floats, controls: Floats) -> Floats:
-        batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
-        return np.broadcast_to(controls, (*batch, 2))
+        return np.broadcast_to(controls, (*batch_of(states, controls), 2))
 
     def jacobians(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
-        batch = np.broadcast_shapes(states.shape[:-1], controls.shape[:-1])
+        batch = batch_of(states, controls)
         by_state = np.zeros((*batch, 2, 2))
         return by_state, np.broadcast_to(np.eye(2), (*batch, 2, 2))

@@ -1,0 +1,1 @@
+"""How likely inference is to work in a discretisation, before anybody demonstrates anything."""
