@@ -32,6 +32,7 @@ from paper_figures import (
     choice_effects,
     chosen_tasks,
     control_limits,
+    dynamics,
     final_state_error,
     forecast_diagram,
     hypothesis_map,
@@ -84,6 +85,7 @@ FIGURES: Mapping[str, ModuleType] = {
         success,
         success_cases,
         baselines,
+        dynamics,
     )
 }
 

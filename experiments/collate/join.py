@@ -113,7 +113,7 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
         CollateError: a point lacks the table, or has other columns than the first.
     """
     columns = points[0].columns(name)
-    if several := len({point.config["system.target"] for point in points}) > 1:
+    if several := len({point.config.get("system.target") for point in points}) > 1:
         columns = list(dict.fromkeys(each for point in points for each in point.columns(name)))
     opening = list(takewhile(points[0].opening.__contains__, columns))
     groups = [[point] for point in points]

@@ -22,6 +22,7 @@ from paper_figures.report import (
     section_control_noise,
     section_controls,
     section_costs,
+    section_dynamics,
     section_evidence,
     section_origin,
     section_readings,
@@ -173,6 +174,11 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         "Other ways to rank regions",
         section_baselines.section,
         (Figure("baselines", "baselines", "Rank of the truth by six methods."),),
+    ),
+    (
+        "Which dynamics it works for",
+        section_dynamics.section,
+        (Figure("dynamics", "dynamics", "Success by system, and whether it can be foretold."),),
     ),
     (
         "What to record next",

@@ -177,6 +177,37 @@ def test_other_columns_are_refused(tmp_path: Path) -> None:
         collate(points, tmp_path / "study")
 
 
+def test_points_of_two_systems_stand_in_one_table(tmp_path: Path) -> None:
+    """With the columns of both, and a version of the source each."""
+    other = pd.DataFrame({"trial": [0, 1], "miss": [0.5, 0.25]})
+    wheel = {"target": "mlci.zoo.unicycle.Unicycle", "arguments": {}}
+    points = [point_with(tmp_path), hand_made(tmp_path, {"trials": other}, system=wheel)]
+    assert points[0].source != points[1].source
+    collate(points, tmp_path / "study")
+    header, *rows = lines(tmp_path / "study")
+    assert header == "system.target,truth,cells,actions,dt,samples,seed,trial,error,miss"
+    opening = "wall,12,3,0.5,1,0"
+    assert rows == [
+        f"mlci.systems.DoubleIntegrator,{opening},0,0.5,",
+        f"mlci.systems.DoubleIntegrator,{opening},1,0.25,",
+        f"mlci.zoo.unicycle.Unicycle,{opening},0,,0.5",
+        f"mlci.zoo.unicycle.Unicycle,{opening},1,,0.25",
+    ]
+    collated = study_of(tmp_path / "study").collated
+    assert collated is not None
+    assert len(collated.sources) == len(collated.systems) == 2
+
+
+def test_two_versions_of_one_of_two_systems_are_a_mixture(tmp_path: Path) -> None:
+    wheel = {"target": "mlci.zoo.unicycle.Unicycle", "arguments": {}}
+    points = [point_with(tmp_path), point_with(tmp_path, system=wheel)]
+    points.append(
+        hand_made(tmp_path, trials(0.5), system=wheel, seed=1, record={"source": "edited"})
+    )
+    with pytest.raises(CollateError, match="these points come from different versions"):
+        collate(points, tmp_path / "study")
+
+
 def test_a_missing_table_is_refused(tmp_path: Path) -> None:
     points = [point_with(tmp_path, seed=0), hand_made(tmp_path, seed=1)]
     with pytest.raises(CollateError, match=f"point {points[1].identity} has no table trials.csv"):

@@ -42,6 +42,18 @@ def test_later_values_change_faster_and_settings_fastest() -> None:
     ]
 
 
+def test_the_ends_of_many_systems_are_the_first_and_the_last() -> None:
+    systems = [[f"system={name}", f"seed={seed}"] for seed, name in enumerate("abc")]
+    *points, note = listed(settings=systems, ends=True)
+    assert points == ["system='a' seed=0", "system='c' seed=2"] or points == [
+        "system=a seed=0",
+        "system=c seed=2",
+    ]
+    assert note == "settings: the first and the last stand for all 3 systems"
+    # Other settings are no axis: all of them stay.
+    assert len(listed(settings=[["seed=0"], ["seed=1"], ["seed=2"]], ends=True)) == 3
+
+
 def test_option_of_a_group_stays_a_word() -> None:
     assert listed(params={"grid": "100,400"}) == ["grid='100'", "grid='400'"]
 
