@@ -79,7 +79,7 @@ MLCI = {
     "mlci.outlook": "",
     "mlci.outlook.rule": "mlci.spaces",
     "mlci.outlook.flow": "mlci.demonstrations mlci.grids mlci.systems",
-    "mlci.outlook.outlook": "mlci.diagnosis mlci.maxent mlci.outlook.flow",
+    "mlci.outlook.outlook": "mlci.diagnosis mlci.evidence mlci.maxent mlci.outlook.flow",
     "mlci.sets.chains": "mlci.spaces",
     "mlci.sets.evidence": "mlci.inference mlci.maxent",
     "mlci.sets.posterior": "mlci.sets.chains mlci.sets.evidence",

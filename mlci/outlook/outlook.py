@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose
+from mlci.evidence import DEFAULT_MODEL_ERROR
 from mlci.maxent import TrajectoryDistribution
 from mlci.outlook.flow import control_reach, flow_expansion
 from mlci.spaces import Bools, Box, Floats
@@ -39,27 +40,55 @@ class Outlook:
         expansion: mean over tasks of the logarithm by which the flow stretches, see
             `flow_expansion`.
         reachable: (P,) whether the tabular agent reaches a task's goal.
-        touched: (C,) share of the tasks whose optimum without a constraint enters a region.
-        crossed: (C,) mean over tasks of Phi, 0 where the goal is out of reach.
-        forecast_error: violation distance (11) of these optima, the mean over tasks that the
-            tabular agent can do, as a share of the regions that an optimum enters.
+        entered: (P, C) whether the optimum of a task without a constraint enters a region.
+        phi: (P, C) Phi, 0 where the goal is out of reach.
     """
 
     diagnosis: Diagnosis
     reach: Floats
     expansion: float
     reachable: Bools
-    touched: Floats
-    crossed: Floats
-    forecast_error: float
+    entered: Bools
+    phi: Floats
+
+    @property
+    def touched(self) -> Floats:
+        """(C,) share of the tasks whose optimum enters a region."""
+        return np.asarray(np.mean(self.entered, axis=0))
+
+    @property
+    def crossed(self) -> Floats:
+        """(C,) mean over tasks of Phi."""
+        return np.asarray(np.mean(self.phi, axis=0))
+
+    @property
+    def forecast_error(self) -> float:
+        """Violation distance (11) of the optima, the mean over tasks that the tabular agent can do,
+        as a share of the regions that an optimum enters; 1 if it can do none."""
+        if not self.reachable.any():
+            return 1.0
+        off = np.sum(np.abs(self.phi - self.entered), axis=1)[self.reachable]
+        return float(np.mean(off) / max(np.mean(np.sum(self.entered, axis=1)), 1.0))
+
+    def rivals(self, demonstrations: int) -> Floats:
+        """(C,) regions that are expected to be ranked before region i, were it the truth.
+
+        A region is, if its evidence is at least as large in these tasks, and no demonstration
+        enters it. Who does a task whose optimum keeps out of the truth is taken to do it optimally,
+        and who must go round the truth to keep out of the other too. So a region survives so many
+        demonstrations with probability (1 - q)^demonstrations, where q is the share of the tasks
+        whose optimum enters it and not the truth.
+        """
+        evidence = np.mean(-np.log1p((DEFAULT_MODEL_ERROR - 1) * self.phi), axis=0)
+        without = (~self.entered).T.astype(float) @ self.entered / len(self.entered)  # (truth, r)
+        before = evidence >= evidence[:, None]
+        np.fill_diagonal(before, val=False)
+        return np.asarray(np.sum(before * (1 - without) ** demonstrations, axis=1))
 
     def features(self, demonstrations: int) -> Floats:
         """(C, F) the numbers of FEATURES, were region i the truth.
 
-        What has a scale is taken by its logarithm, that of a little more where it may be 0. Rivals
-        of a region are expected to be ranked before it: they are crossed at least as often by the
-        tabular agent, and yet no demonstration enters them, as if tasks were independent and
-        optima those of an agent without a constraint.
+        What has a scale is taken by its logarithm, that of a little more where it may be 0.
 
         Args:
             demonstrations: how many are to be seen.
@@ -72,8 +101,7 @@ class Outlook:
             float(np.mean(~self.reachable)),
             self.forecast_error,
         ]
-        left = (1 - self.touched) ** demonstrations  # probability that none enters a region
-        rivals = np.log1p((self.crossed >= self.crossed[:, None]) @ left - left)
+        rivals = np.log1p(self.rivals(demonstrations))
         expected = np.log(0.1 + demonstrations * self.crossed)
         shared = np.tile(whole, (len(self.touched), 1))
         return np.column_stack([shared, self.touched, rivals, expected])
@@ -95,23 +123,20 @@ def outlook(
     if not paths:
         raise ValueError("an outlook needs the optimal path of a task at least")
     mask = np.ones(len(model.regions), dtype=bool) if hypotheses is None else np.asarray(hypotheses)
-    crossed = np.zeros((len(paths), int(np.sum(mask))))
+    phi = np.zeros((len(paths), int(np.sum(mask))))
     reachable = np.zeros(len(paths), dtype=bool)
     for number, path in enumerate(paths):
         distribution = TrajectoryDistribution.of_task(model, path.task)
         reachable[number] = distribution.is_possible
         if distribution.is_possible:
-            crossed[number] = distribution.violation_probabilities()[mask]
-    touched = np.array([model.regions.violated_by(path.states)[mask] for path in paths])
-    errors = np.sum(np.abs(crossed - touched), axis=1)[reachable]
-    entered = max(float(np.mean(np.sum(touched, axis=1))), 1.0)
+            phi[number] = distribution.violation_probabilities()[mask]
+    entered = np.array([model.regions.violated_by(path.states)[mask] for path in paths])
     actions = Box(model.actions.min(axis=0), model.actions.max(axis=0))
     return Outlook(
         diagnosis=diagnose(model),
         reach=control_reach(model.system, model.grid, actions, model.dt),
         expansion=float(np.mean([flow_expansion(model.system, path) for path in paths])),
         reachable=reachable,
-        touched=np.mean(touched, axis=0),
-        crossed=np.mean(crossed, axis=0),
-        forecast_error=float(np.mean(errors)) / entered if reachable.any() else 1.0,
+        entered=entered,
+        phi=phi,
     )

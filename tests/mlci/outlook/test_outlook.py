@@ -55,12 +55,13 @@ def test_each_number_is_that_of_a_loop(model, paths) -> None:
     assert set(features["unreachable"]) == {np.mean(~known.reachable)}
     off = np.abs(phi - entered).sum(axis=1)[known.reachable].mean()
     np.testing.assert_allclose(features["forecast_error"], off / entered.sum(axis=1).mean())
+    evidence = np.mean(-np.log(0.1 + 0.9 * (1 - phi)), axis=0)
     for i in range(18):
-        rivals = sum(
-            (1 - entered[:, k].mean()) ** 4
-            for k in range(18)
-            if k != i and phi[:, k].mean() >= phi[:, i].mean()
-        )
+        rivals = 0.0
+        for k in range(18):
+            if k != i and evidence[k] >= evidence[i]:
+                telling = sum(entered[j, k] and not entered[j, i] for j in range(6)) / 6
+                rivals += (1 - telling) ** 4
         assert features["rivals"][i] == pytest.approx(np.log(1 + rivals), abs=1e-12)
 
 
