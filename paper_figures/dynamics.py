@@ -61,6 +61,8 @@ def draw(
         middle.set_xlim(left=0)
         weights = success_rule[success_rule["feature"] != "intercept"]
         names = [FEATURES[name] for name in weights["feature"]]
+        if not names:  # no number pays
+            right.set_yticks([])
         _rows(right, names, *(weights[f"weight{end}"] for end in _ENDS))
         right.axvline(0, color=GUIDE, linewidth=0.6)
         right.set_xlabel("log odds by standard deviation")
@@ -112,5 +114,6 @@ def _rows(axes: Axes, names: list[str], middle: pd.Series, low: pd.Series, high:
     numbers = np.arange(len(names))
     errors = [(middle - low).clip(lower=0), (high - middle).clip(lower=0)]
     axes.errorbar(middle, numbers, xerr=errors, fmt="o", color=DEMONSTRATION, elinewidth=0.8)
-    axes.set_yticks(numbers, labels=names)
-    axes.set_ylim(len(names) - 0.5, -0.5)
+    if names:
+        axes.set_yticks(numbers, labels=names)
+        axes.set_ylim(len(names) - 0.5, -0.5)

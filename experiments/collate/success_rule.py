@@ -15,7 +15,7 @@ from mlci.outlook.rule import (
     left_out_choice,
 )
 
-MOST = 4  # features of the rule
+MOST = 3  # features of the rule
 ALONE = "expected_violations"  # what the rule is compared with, beside the base rate
 _MEANS = ("top", "first", "log_rank", "claim", "over_claim", "violation_distance", "out_of_reach")
 
@@ -25,12 +25,12 @@ def success_tables(dynamics: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
     Returns:
         `success_systems`, means of each system, number of cells and time step. With points of
-        three systems or more also `success_rule`, a row a feature; `success_scores`, a row a way to
+        two systems or more also `success_rule`, a row a feature; `success_scores`, a row a way to
         foretell; and `success_forecasts`, a row a point with what each way says of it.
     """
     made = {"success_systems": success_systems(dynamics)}
     told = dynamics.dropna(subset=[*FEATURES, "top"]).reset_index(drop=True)
-    if told["system"].nunique() >= 3:  # one that is left out, and two to choose features by
+    if told["system"].nunique() >= 2:  # one that is left out
         forecasts = success_forecasts(told)
         made["success_forecasts"] = forecasts
         made["success_scores"] = success_scores(forecasts)

@@ -94,7 +94,7 @@ def brier_scores(probability: ArrayLike, success: ArrayLike) -> Floats:
 
 
 def choose_features(
-    features: Floats, success: Floats, groups: ArrayLike, most: int, least: float = 0.002
+    features: Floats, success: Floats, groups: ArrayLike, most: int, least: float = 0.01
 ) -> list[int]:
     """Features that foretell success in groups that were left out, the most telling first.
 
@@ -105,11 +105,13 @@ def choose_features(
     Args:
         features: (B, F) numbers of each case.
         success: (B,) share of a case's trials that succeeded.
-        groups: (B,) what is left out at a time, such as the system.
+        groups: (B,) what is left out at a time, such as the system; of one alone none is chosen.
         most: features, at most.
         least: by which a further feature must lower the score.
     """
     chosen: list[int] = []
+    if len(np.unique(np.asarray(groups))) < 2:
+        return chosen  # no group can be left out
     nothing = features[:, []]
     best = float(np.mean(brier_scores(left_out(nothing, success, groups), success)))
     while len(chosen) < most:

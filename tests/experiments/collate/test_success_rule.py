@@ -19,6 +19,7 @@ def test_the_number_that_decides_is_the_rules_first(made) -> None:
     rule = made["success_rule"]
     assert rule["feature"].iloc[0] == "reach"
     assert rule["feature"].iloc[-1] == "intercept"
+    assert len(rule) <= 4
     first = rule.iloc[0]
     assert 0 < first["weight_low"] < first["weight"] < first["weight_high"]
     table = dynamics()["reach"]
@@ -58,5 +59,7 @@ def test_means_are_of_each_system_grid_and_time_step(made) -> None:
     assert row["top_low"] <= row["top"] <= row["top_high"]
 
 
-def test_two_systems_make_no_rule() -> None:
-    assert set(success_tables(dynamics(2))) == {"success_systems"}
+def test_two_systems_have_no_third_to_choose_features_by() -> None:
+    forecasts = success_tables(dynamics(2))["success_forecasts"]
+    np.testing.assert_allclose(forecasts["rule"], forecasts["base_rate"])
+    assert set(success_tables(dynamics(1))) == {"success_systems"}

@@ -1,0 +1,95 @@
+"""What was known before, beside what came: of a tiny point; and truths drawn for a study."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from tiny_point import composed
+
+from experiments.config.paths import CONF
+from experiments.config.read import read_config
+from experiments.config.settings import Settings
+from experiments.point import dynamics_tables
+from experiments.point.dynamics_tables import unconstrained_paths
+from experiments.point.run import run_point
+from experiments.point.truth_draw import drawn_truths
+from experiments.tracking.store import Store
+from experiments.tracking.trees import canonical_json
+from mlci.outlook.outlook import FEATURES, outlook
+from mlci.tabular import discretize
+
+WORDS = ["system=damped_spring", "truth=cell", "truth.cell=54", "inference.calibrate=false"]
+POINT = [*WORDS, "horizon=3.0", "dt=0.5", "actions=5", "grid.shape=[12,10]", "dynamics.tasks=6"]
+POINT += ["demonstrations.pairs=8", "demonstrations.keep=5", "demonstrations.dt=0.05"]
+POINT += ["demonstrations.restarts=1", "ranks.demonstrations=3", "ranks.subsets=4", "rollouts=1"]
+POINT += ["safety.shape=[41,41]", "misfit=0"]
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    return Store(tmp_path_factory.mktemp("store"))
+
+
+def test_the_row_is_the_outlook_of_the_truth_and_its_ranks(store: Store) -> None:
+    settings = read_config(composed(*POINT))[0]
+    tables = run_point(settings, store, lambda line: None)
+    (row,) = tables["dynamics"].to_dict("records")
+    paths = unconstrained_paths(settings, store)
+    assert row["system"] == "DampedSpring"
+    assert row["tasks"] == len(paths) >= 3
+    model = discretize(
+        settings.model, settings.cells, settings.action_values, settings.dt, settings.candidates
+    )
+    expected = outlook(model, paths).features(3)[54]
+    np.testing.assert_allclose([row[name] for name in FEATURES], expected)
+    ranks = tables["ranks"].query("demonstrations == 3")
+    assert row["demonstrations"] == 3
+    assert row["top"] == pytest.approx((ranks["rank"] <= 5).mean())
+    assert row["log_rank"] == pytest.approx(np.log(ranks["rank"]).mean())
+    assert row["out_of_reach"] == pytest.approx(1 - tables["trials"]["reachable"].mean())
+    distance = tables["trials"]["violation_distance"]
+    assert row["violation_distance"] == pytest.approx(distance.mean(), nan_ok=True)
+
+
+def test_no_demonstration_has_a_part_in_what_is_known_before(store: Store) -> None:
+    one = read_config(composed(*POINT))[0]
+    changes = (["truth.cell=3"], ["seed=1"], ["grid.shape=[6,6]"], ["demonstrations.pairs=7"])
+    for words in changes:
+        other = read_config(composed(*(word for word in POINT if word.partition("=")[0] != words[0]
+                                       .partition("=")[0]), *words))[0]  # fmt: skip
+        assert canonical_json(dynamics_tables.path_inputs(other)) == canonical_json(
+            dynamics_tables.path_inputs(one)
+        )
+    for words in (["demonstrations.iterations=3"], ["tasks.upper=[1.0,0.5]"], ["dynamics.tasks=7"]):
+        other = read_config(composed(*POINT, *words))[0]
+        assert canonical_json(dynamics_tables.path_inputs(other)) != canonical_json(
+            dynamics_tables.path_inputs(one)
+        )
+
+
+def test_the_studys_truths_are_those_that_are_drawn(store: Store) -> None:
+    settings: Settings = read_config(
+        composed(*WORDS, "experiment=dynamics", "system=damped_spring")
+    )[0]
+    drawn = drawn_truths(settings, store, 5)
+    text = (CONF / "experiment" / "dynamics.yaml").read_text()
+    cells = re.findall(r'system=damped_spring,.*truth.cell=([\d,]+)"', text)
+    assert sorted(int(cell) for part in cells for cell in part.split(",")) == drawn
+    paths = unconstrained_paths(settings, store)
+    for cell in drawn:
+        box = settings.candidates.box(cell)
+        inside = [np.any(box.contains(path.states)) for path in paths]
+        assert np.mean(inside) >= 0.1 - 1e-9
+
+
+def test_every_system_of_the_study_has_five_truths() -> None:
+    text = Path(CONF / "experiment" / "dynamics.yaml").read_text()
+    rows = re.findall(r'system=(\w+),.*truth.cell=([\d,]+)", seed=(\d)', text)
+    table = pd.DataFrame(rows, columns=["system", "cells", "seed"])
+    counts = table["cells"].str.split(",").map(len).groupby(table["system"]).sum()
+    assert set(counts) == {5}
+    assert len(counts) >= 10
