@@ -8,6 +8,7 @@ success is separable (Hoerl and Kennard 1970; Le Cessie and van Houwelingen 1992
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,7 +95,12 @@ def brier_scores(probability: ArrayLike, success: ArrayLike) -> Floats:
 
 
 def choose_features(
-    features: Floats, success: Floats, groups: ArrayLike, most: int, least: float = 0.01
+    features: Floats,
+    success: Floats,
+    groups: ArrayLike,
+    most: int,
+    first: Sequence[int] = (),
+    least: float = 0.01,
 ) -> list[int]:
     """Features that foretell success in groups that were left out, the most telling first.
 
@@ -107,13 +113,13 @@ def choose_features(
         success: (B,) share of a case's trials that succeeded.
         groups: (B,) what is left out at a time, such as the system; of one alone none is chosen.
         most: features, at most.
+        first: features that are taken in any case.
         least: by which a further feature must lower the score.
     """
-    chosen: list[int] = []
+    chosen = list(first)
     if len(np.unique(np.asarray(groups))) < 2:
         return chosen  # no group can be left out
-    nothing = features[:, []]
-    best = float(np.mean(brier_scores(left_out(nothing, success, groups), success)))
+    best = float(np.mean(brier_scores(left_out(features[:, chosen], success, groups), success)))
     while len(chosen) < most:
         scores = {
             f: np.mean(brier_scores(left_out(features[:, [*chosen, f]], success, groups), success))
@@ -128,13 +134,15 @@ def choose_features(
     return chosen
 
 
-def left_out_choice(features: Floats, success: Floats, groups: ArrayLike, most: int) -> Floats:
+def left_out_choice(
+    features: Floats, success: Floats, groups: ArrayLike, most: int, first: Sequence[int] = ()
+) -> Floats:
     """(B,) as `left_out`, where features are chosen anew without the group that is foretold."""
     groups = np.asarray(groups)
     probability = np.empty(len(success))
     for group in np.unique(groups):
         out = groups == group
-        chosen = choose_features(features[~out], success[~out], groups[~out], most)
+        chosen = choose_features(features[~out], success[~out], groups[~out], most, first)
         rule = fit_rule(features[~out][:, chosen], success[~out])
         probability[out] = rule.probability(features[out][:, chosen])
     return probability

@@ -15,12 +15,12 @@ def made() -> dict[str, pd.DataFrame]:
     return success_tables(dynamics())
 
 
-def test_the_number_that_decides_is_the_rules_first(made) -> None:
+def test_the_rule_adds_the_number_that_decides_to_expected_violations(made) -> None:
     rule = made["success_rule"]
-    assert rule["feature"].iloc[0] == "reach"
+    assert rule["feature"].tolist()[:2] == ["expected_violations", "reach"]
     assert rule["feature"].iloc[-1] == "intercept"
     assert len(rule) <= 4
-    first = rule.iloc[0]
+    first = rule.iloc[1]
     assert 0 < first["weight_low"] < first["weight"] < first["weight_high"]
     table = dynamics()["reach"]
     assert (first["least"], first["most"]) == (table.min(), table.max())
@@ -61,5 +61,5 @@ def test_means_are_of_each_system_grid_and_time_step(made) -> None:
 
 def test_two_systems_have_no_third_to_choose_features_by() -> None:
     forecasts = success_tables(dynamics(2))["success_forecasts"]
-    np.testing.assert_allclose(forecasts["rule"], forecasts["base_rate"])
+    np.testing.assert_allclose(forecasts["rule"], forecasts["expected_violations"])
     assert set(success_tables(dynamics(1))) == {"success_systems"}

@@ -60,6 +60,8 @@ def test_what_is_left_out_has_no_part_in_its_own_forecast(foretell) -> None:
 def test_the_feature_that_tells_is_chosen_and_none_where_none_does() -> None:
     features, success, groups = cases()
     assert choose_features(features, success, groups, most=1) == [1]
+    assert choose_features(features, success, groups, most=2, first=[3]) == [3, 1]
+    assert choose_features(features, success, np.zeros(120), most=2, first=[3]) == [3]
     rng = np.random.default_rng(1)
     shuffled = rng.permutation(success)
     assert choose_features(features[:, [0, 2, 3]], shuffled, groups, most=2, least=0.01) == []
