@@ -8,6 +8,7 @@ import traceback
 import types
 import typing
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -76,13 +77,27 @@ def arguments_of(
         ValidationError: an argument that it does not take, lacks, or takes otherwise.
     """
     try:
-        constructs = inspect.isclass(callee)
-        hinted: Any = callee.__init__ if constructs else callee
-        hints = typing.get_type_hints(hinted)
+        _hints(callee)
     except Exception as error:  # anybody's hints
         words = f"type hints of {target.rpartition('.')[2]} cannot be read: {error}"
         raise target_error(target, words) from None
+    given = {key: value for key, value in tree.items() if key != "_target_"}
+    checked = _strict(callee).validate_python(given)
     parameters = inspect.signature(callee).parameters
+    return {name: checked.get(name, parameter.default) for name, parameter in parameters.items()}
+
+
+@cache
+def _hints(callee: Callable[..., Any]) -> dict[str, Any]:
+    """The type hints of the arguments of a class or a function."""
+    hinted: Any = callee.__init__ if inspect.isclass(callee) else callee
+    return typing.get_type_hints(hinted)
+
+
+@cache  # a sweep asks for it twice a point
+def _strict(callee: Callable[..., Any]) -> TypeAdapter[Any]:
+    """What checks the arguments of a class or a function."""
+    hints, parameters = _hints(callee), inspect.signature(callee).parameters
     required, optional = typing_extensions.Required, typing_extensions.NotRequired
     fields = {
         name: (required if parameter.default is parameter.empty else optional)[
@@ -91,10 +106,7 @@ def arguments_of(
         for name, parameter in parameters.items()
     }
     arguments: Any = typing_extensions.TypedDict("arguments", fields)  # type: ignore[misc]
-    strict = TypeAdapter(with_config(STRICT)(arguments))
-    given = {key: value for key, value in tree.items() if key != "_target_"}
-    checked = strict.validate_python(given)
-    return {name: checked.get(name, parameter.default) for name, parameter in parameters.items()}
+    return TypeAdapter(with_config(STRICT)(arguments))
 
 
 def _kind(hint: Any) -> Any:
