@@ -51,7 +51,7 @@ SHORT = [
     (r"^pip install (?:-e )?'\.\[(\w+)\]'", r"grep '^\1 = ' pyproject.toml"),
     (r"^(python -m paper_figures( [a-z ]+)?)( --jobs 2)?$", r"\1 --jobs 1"),
     # These are run, and what they make is looked at, in experiments/config/test_own_system.py.
-    (r"^mlci-.* ?unicycle.*", "true"),
+    (r"^mlci-.* ?forklift.*", "true"),
     (r"experiment=paper", r"experiment=in_cell"),
     (r"^(?!.*scale=smoke)(.*run\.py -m .*)", r"\1 scale=smoke sweep.dry_run=true"),
     (r"^(?!.*scale=smoke)(.*run\.py( .*)?)$", r"\1 scale=smoke"),

@@ -70,20 +70,20 @@ def test_a_pendulum_that_goes_the_long_way_avoids_what_is_on_the_short_one() -> 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder with the unicycle's module and config."""
-    (tmp_path / "unicycle.py").write_text(blocks("conf/README.md", "python")[0])
-    (config,) = [block for block in blocks("conf/README.md", "yaml") if "unicycle" in block]
+    """A folder with the forklift's module and config."""
+    (tmp_path / "forklift.py").write_text(blocks("conf/README.md", "python")[0])
+    (config,) = [block for block in blocks("conf/README.md", "yaml") if "forklift" in block]
     (tmp_path / "conf" / "subject").mkdir(parents=True)
-    (tmp_path / "conf" / "subject" / "unicycle.yaml").write_text(config)
+    (tmp_path / "conf" / "subject" / "forklift.yaml").write_text(config)
     monkeypatch.syspath_prepend(tmp_path)
     yield tmp_path
-    sys.modules.pop("unicycle", None)
+    sys.modules.pop("forklift", None)
 
 
 @pytest.mark.long
-def test_the_unicycles_pillar_is_first(folder: Path) -> None:
+def test_the_forklifts_pillar_is_first(folder: Path) -> None:
     """A region of the pillar comes first with a finite gain, and nothing is certain."""
-    words = ["subject=unicycle", f"results={folder / 'results'}", *SMALLER]
+    words = ["subject=forklift", f"results={folder / 'results'}", *SMALLER]
     done = run_here(run.main, *words, folder=folder)
     assert done.returncode == 0, done.stderr
     (point,) = (folder / "results" / "points").iterdir()

@@ -48,12 +48,12 @@ SMOKE = {
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder with the README's two files; it is not in the path until a config names a module."""
     module, config, _ = BLOCKS
-    (tmp_path / "unicycle.py").write_text(module)
+    (tmp_path / "forklift.py").write_text(module)
     (tmp_path / "conf" / "subject").mkdir(parents=True)
-    (tmp_path / "conf" / "subject" / "unicycle.yaml").write_text(config)
+    (tmp_path / "conf" / "subject" / "forklift.yaml").write_text(config)
     monkeypatch.setattr(sys, "path", list(sys.path))
     yield tmp_path
-    sys.modules.pop("unicycle", None)
+    sys.modules.pop("forklift", None)
 
 
 def command(folder: Path, line: str) -> tuple[int, str, str]:
@@ -62,7 +62,7 @@ def command(folder: Path, line: str) -> tuple[int, str, str]:
     It runs here, as starting it takes a second or two; what the folder holds is read anew.
     """
     name, *words = line.split()
-    sys.modules.pop("unicycle", None)
+    sys.modules.pop("forklift", None)
     for cached in CACHES:
         cached.cache_clear()
     usual = signal.getsignal(signal.SIGTERM)
@@ -75,7 +75,7 @@ def command(folder: Path, line: str) -> tuple[int, str, str]:
 
 def test_example_is_short_and_not_ours() -> None:
     assert sum(len(block.splitlines()) for block in BLOCKS) < 60
-    assert not list(CHECKOUT.glob("mlci/**/*unicycle*"))
+    assert not list(CHECKOUT.glob("mlci/**/*forklift*"))
 
 
 def test_every_command_works_in_a_folder_of_its_own(folder: Path) -> None:
@@ -86,11 +86,11 @@ def test_every_command_works_in_a_folder_of_its_own(folder: Path) -> None:
     status, out, err = command(folder, sweep)
     assert status == 0, err
     assert "2 points: 1 done, 1 missing; 1 to run" in out
-    tables = folder / "results" / "unicycle" / "tables"
+    tables = folder / "results" / "forklift" / "tables"
     assert set(pd.read_csv(tables / "summary.csv")["actions"]) == {"3x5"}
     status, out, err = command(folder, draw)
     assert status == 0, err
-    assert (folder / "results" / "unicycle" / "figures" / "hypothesis_map_pillar.pdf").is_file()
+    assert (folder / "results" / "forklift" / "figures" / "hypothesis_map_pillar.pdf").is_file()
 
     paths = pd.read_csv(tables / "paths.csv")
     (folder / "recorded").mkdir()
@@ -101,17 +101,17 @@ def test_every_command_works_in_a_folder_of_its_own(folder: Path) -> None:
     assert status == 0, err
     assert f"{paths['demonstration'].nunique()} used, 0 files not used" in out
     assert re.search(r" x .* m, y .* m$", out, flags=re.MULTILINE)
-    status, out, err = command(folder, "mlci-advise subject=unicycle")
+    status, out, err = command(folder, "mlci-advise subject=forklift")
     assert "8x8x8" in out, err
     assert sorted(path.name for path in folder.iterdir() if path.name != "__pycache__") == [
-        *("conf", "recorded", "results", "unicycle.py")
+        *("conf", "forklift.py", "recorded", "results")
     ]
 
-    module = folder / "unicycle.py"
+    module = folder / "forklift.py"
     module.write_text(module.read_text() + "\nEDITED = True\n")
     status, out, err = command(folder, f"{sweep} sweep.dry_run=true")
     assert "2 points: 2 stale; 2 to run" in out
-    assert "2 stale" in " ".join(command(folder, "mlci-results status unicycle")[1].split())
+    assert "2 stale" in " ".join(command(folder, "mlci-results status forklift")[1].split())
 
 
 def test_source_counts_what_a_module_imports_from_beside_it(
@@ -132,7 +132,7 @@ def test_source_counts_what_a_module_imports_from_beside_it(
 def test_folder_whose_config_hides_behind_ours_is_refused(folder: Path) -> None:
     (folder / "conf" / "truth").mkdir()
     (folder / "conf" / "truth" / "c1.yaml").write_text("name: c1\n")
-    status, _, err = command(folder, "mlci-run subject=unicycle")
+    status, _, err = command(folder, "mlci-run subject=forklift")
     assert status == 2
     assert "conf/truth/c1.yaml: mlci comes with a truth/c1 of its own; rename this file" in err
     assert len(err.splitlines()) == 1
@@ -178,7 +178,7 @@ REFUSED = {
     "system._target_=mine.Broken": "system: Broken fails: KeyError: 'key'",
     "system._target_=mine.Scalar": "system: Scalar.dynamics must be (7, 5, 2) for states (7, 1, 2) "
     "and controls (5, 1), not (1, 2)",
-    "subject=unicycle": "subject=unicycle: there is no {}/conf/subject/unicycle.yaml",
+    "subject=forklift": "subject=forklift: there is no {}/conf/subject/forklift.yaml",
     "--config-dir=nowhere": "Additional config directory '{}/nowhere' not found",
 }
 
@@ -207,7 +207,7 @@ def test_wrong_system_is_refused(
 def test_word_that_a_subject_overrules_is_refused(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = refusal(["subject=unicycle", "truth=c1"], monkeypatch, capsys)
+    said = refusal(["subject=forklift", "truth=c1"], monkeypatch, capsys)
     assert "truth=c1: a subject brings its own; change values, such as grid.shape" in said
 
 

@@ -56,8 +56,14 @@ def test_every_system_suits_a_truth(system: str) -> None:
 
 @pytest.mark.parametrize("grid", options("grid"))
 def test_every_grid_has_the_cells_of_its_name(grid: str) -> None:
-    # The telescoping pendulum's cells have four sides.
-    system = ["truth=pain"] if grid == "2500" else []
+    # Some are for systems of more dimensions than the pendulum's two.
+    systems = {
+        "1728": ["system=unicycle", "truth=cell"],
+        "2401": ["system=cart_pole", "truth=cell"],
+        "2500": ["truth=pain"],
+        "4096": ["system=planar_quadrotor", "truth=cell"],
+    }
+    system = systems.get(grid, [])
     settings, _ = read_config(composed(f"grid={grid}", *system))
     assert settings.cells.size == settings.columns["cells"] == int(grid)
 
@@ -146,7 +152,10 @@ COMMANDS = [
     ("dtt=0.2", "dtt: unknown key; did you mean dt?"),
     ("demonstrations.pars=3", "demonstrations.pars: unknown key; did you mean pairs?"),
     ("system.gravty=2", "system.gravty: unknown key; did you mean gravity?"),
-    ("grid=300", "grid: there is no 300; there are 100, 400, 576, 900, 1600, 2500"),
+    (
+        "grid=300",
+        "grid: there is no 300; there are 100, 400, 576, 900, 1600, 1728, 2401, 2500, 4096",
+    ),
     ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, pain, wall"),
     ("grdi=100", "grdi: unknown key; did you mean grid?"),
     ("dt=[1", "dt=[1: cannot be read as key=value"),
@@ -385,7 +394,7 @@ def test_all_wrong_points_of_a_sweep_are_reported_at_once(
     [
         (
             ["-m", "grid=100,300"],
-            "grid: there is no 300; there are 100, 400, 576, 900, 1600, 2500 [1 of 2",
+            "grid: there is no 300; there are 100, 400, 576, 900, 1600, 1728, 2401, 2500, 4096 [1",
         ),
         (["-m", "experiment=paper,other"], "experiment=paper,other: a sweep over experiments"),
         (["-m", "study=a,b"], "study=a,b: this changes no result"),
