@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -55,20 +56,21 @@ def test_the_row_is_the_outlook_of_the_truth_and_its_ranks(store: Store) -> None
     assert row["violation_distance"] == pytest.approx(distance.mean(), nan_ok=True)
 
 
-def test_no_demonstration_has_a_part_in_what_is_known_before(store: Store) -> None:
+def test_no_demonstration_has_a_part_in_what_is_known_before() -> None:
     one = read_config(composed(*POINT))[0]
-    changes = (["truth.cell=3"], ["seed=1"], ["grid.shape=[6,6]"], ["demonstrations.pairs=7"])
-    for words in changes:
-        other = read_config(composed(*(word for word in POINT if word.partition("=")[0] != words[0]
-                                       .partition("=")[0]), *words))[0]  # fmt: skip
-        assert canonical_json(dynamics_tables.path_inputs(other)) == canonical_json(
-            dynamics_tables.path_inputs(one)
-        )
-    for words in (["demonstrations.iterations=3"], ["tasks.upper=[1.0,0.5]"], ["dynamics.tasks=7"]):
-        other = read_config(composed(*POINT, *words))[0]
-        assert canonical_json(dynamics_tables.path_inputs(other)) != canonical_json(
-            dynamics_tables.path_inputs(one)
-        )
+
+    def inputs(part: str, **changes: object) -> bytes:
+        """What the paths' key is made from, with changes of a part of the settings."""
+        changed = dataclasses.replace(getattr(one, part), **changes) if part else one
+        settings = dataclasses.replace(one, **({part: changed} if part else changes))
+        return canonical_json(dynamics_tables.path_inputs(settings))
+
+    before = inputs("")
+    assert inputs("truth", cell=3) == inputs("grid", shape=(6, 6)) == before
+    assert inputs("demonstrations", pairs=7) == inputs("", seed=1, dt=1.0) == before
+    assert inputs("demonstrations", iterations=3) != before
+    assert inputs("tasks", upper=(1.0, 0.5)) != before
+    assert inputs("dynamics", tasks=7) != before
 
 
 def test_the_studys_truths_are_those_that_are_drawn(store: Store) -> None:
