@@ -56,16 +56,20 @@ def draw(
     with plt.rc_context(RC):
         _by_system(left, success_forecasts)
         ways = success_scores.set_index("way").loc[list(WAYS)]
-        _rows(middle, list(WAYS.values()), *(ways[f"brier{end}"] for end in _ENDS))
-        middle.set_xlabel("Brier score, systems left out")
+        _rows(
+            middle,
+            [name.replace(" alone", "\nalone") for name in WAYS.values()],
+            *(ways[f"brier{end}"] for end in _ENDS),
+        )
+        middle.set_xlabel("Brier score,\nsystems left out")
         middle.set_xlim(left=0)
         weights = success_rule[success_rule["feature"] != "intercept"]
-        names = [FEATURES[name] for name in weights["feature"]]
+        names = [FEATURES[name].replace(" ", "\n", 1) for name in weights["feature"]]
         if not names:  # no number pays
             right.set_yticks([])
         _rows(right, names, *(weights[f"weight{end}"] for end in _ENDS))
         right.axvline(0, color=GUIDE, linewidth=0.6)
-        right.set_xlabel("log odds by standard deviation")
+        right.set_xlabel("log odds of success\nby standard deviation")
     return figure
 
 
@@ -105,7 +109,7 @@ def _by_system(axes: Axes, forecasts: pd.DataFrame) -> None:
     axes.set_yticks(numbers, labels=list(rows.index))
     axes.invert_yaxis()
     axes.set_xlim(-3, 103)
-    axes.set_xlabel("truth in the top 5 [%]")
+    axes.set_xlabel("truth in the top 5 [%],\nafter 9 demonstrations")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
