@@ -40,6 +40,7 @@ studies: $(READY) ## run what is missing of all other studies, and draw their fi
 		$(BIN)/python experiments/run.py -m experiment=$$each sweep.replace=true; \
 		$(BIN)/python -m paper_figures $$each; \
 	done
+	@$(BIN)/python -m experiments.success_rule
 
 figures: $(READY) ## draw all figures and write the report again, from the tables alone
 	$(BIN)/python -m paper_figures

@@ -55,7 +55,7 @@ def success_systems(dynamics: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for key, group in table.groupby(["system", "cells", "dt", "samples"], sort=True):
         names = dict(zip(("system", "cells", "dt", "samples"), key, strict=True))
-        counts = resamples(np.array([1] * len(group)), [*map(str, key), "dynamics"])
+        counts = resamples(np.ones(len(group), dtype=np.int64), [*map(str, key), "dynamics"])
         row = {**names, "points": len(group)}
         for name in _MEANS:
             row |= _interval(name, group[name].to_numpy(float), counts.astype(float))
@@ -89,7 +89,7 @@ def success_scores(forecasts: pd.DataFrame) -> pd.DataFrame:
         a bootstrap over systems and, in each, points; numbers of `systems` and `points`.
     """
     ordered = forecasts.sort_values("system", kind="stable")
-    sizes = ordered.groupby("system").size().to_numpy()
+    sizes = np.unique(ordered["system"].to_numpy(str), return_counts=True)[1].astype(np.int64)
     counts = resamples(sizes, ["success_scores"]).astype(float)
     success = ordered["top"].to_numpy(float)
     scores = {
