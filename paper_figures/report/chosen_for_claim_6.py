@@ -59,6 +59,6 @@ def _verdict(rows: dict[tuple[str, str], dict[str, float]]) -> str:
         told.append(f"{text} in {chosen}, {verdict} {random} after random ones")
     return (
         f"\nAfter five chosen tasks of the simulated demonstrator {told[0]}; {told[1]}. An area "
-        "overlaps easily where it takes many regions, which those after random tasks do that tell "
-        "little; the share of its regions that overlap says how much of it is right.\n"
+        "that took many regions would overlap easily; the last column says how many it takes, and "
+        "the one before how much of it is right.\n"
     )
