@@ -6,13 +6,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from experiments.console import probability
+from experiments.console import bounds, probability
 from experiments.terminal import entry, table_lines
 from mlci.actuation.inference import ControlInference
 from mlci.answers import listed
+from mlci.areas.belief import AreaBelief
 from mlci.sets.posterior import SetPosterior
 
-_MARGINALS = 5  # that are printed
+_AREAS, _MARGINALS = 3, 5  # that are printed
 
 
 def set_lines(sets: SetPosterior | None, names: Sequence[str]) -> Iterator[str]:
@@ -32,6 +33,27 @@ def set_lines(sets: SetPosterior | None, names: Sequence[str]) -> Iterator[str]:
         yield from entry("", str(sets.check))
         if not sets.check.agrees:
             yield from entry("warning", "chains over sets disagree: raise inference.sets.steps")
+
+
+def area_lines(belief: AreaBelief | None) -> Iterator[str]:
+    """The area that is expected to overlap best with what is forbidden, part by part."""
+    if belief is None:
+        return
+    parts, space = belief.parts, belief.raster.space
+    yield from entry(
+        "area",
+        f"of one or two shapes; expected overlap with what is forbidden, if anything is, "
+        f"{belief.overlap:.2f} (intersection over union, as far as prior and model are right); "
+        f"nothing is forbidden with probability {probability(float(belief.sizes[0]))}"
+        f"{':' if parts else ''}",
+    )
+    for part in parts[:_AREAS]:
+        yield from entry(
+            "",
+            f"{bounds(part.hull, space)}; forbidden somewhere with at least "
+            f"{probability(part.probability)}",
+            hang=2,
+        )
 
 
 def control_lines(controls: ControlInference | None, top: int) -> Iterator[str]:

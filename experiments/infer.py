@@ -18,7 +18,7 @@ import numpy as np
 import mlci.preparation
 from experiments import infer_table
 from experiments.app import DONE, FAILED, run_command
-from experiments.belief_lines import control_lines, set_lines
+from experiments.belief_lines import area_lines, control_lines, set_lines
 from experiments.config.paths import results_folder
 from experiments.config.read import read_recorded_config, writable_results
 from experiments.config.settings import ESTIMATE, RecordedSettings
@@ -26,6 +26,7 @@ from experiments.console import answer_lines, diagnosis_lines, doubt_lines, refu
 from experiments.lookback.recordings import CALIBRATION
 from experiments.page.beliefs import belief_sentences
 from experiments.page.document import page
+from experiments.point.area_shapes import area_belief, area_record, area_table
 from experiments.point.controls import control_record, recorded_controls
 from experiments.point.forecasts import exported_calibration, recorded_calibration
 from experiments.point.ranking_tables import ranking_table
@@ -47,6 +48,7 @@ from experiments.tracking.store import Store
 from experiments.tracking.trees import canonical_json, plain
 from mlci.actuation.inference import ControlInference
 from mlci.answers import Answer, answer
+from mlci.areas.belief import AreaBelief
 from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
@@ -115,9 +117,11 @@ def infer(settings: RecordedSettings) -> int:
     begin("weighing sets of hypotheses")
     sets = set_belief(settings, model, demonstrations, result.inference, np.random.default_rng(0))
     controls = recorded_controls(settings, model, demonstrations)
+    begin("weighing areas of one or two shapes")
+    area = area_belief(settings, model, demonstrations, result.inference, np.random.default_rng(0))
     begin("drawing the map")
     # All is saved before it is printed, in case nobody reads on.
-    folder = _save(settings, demonstrations, problems, result, checks, sets, controls)
+    folder = _save(settings, demonstrations, problems, result, checks, sets, controls, area)
     diagnosis, count = diagnose(model), len(demonstrations)
     unreachable = int(np.sum(~result.inference.reachable))
     doubtful = [check for check in checks if check.doubts]
@@ -130,6 +134,7 @@ def infer(settings: RecordedSettings) -> int:
         *_answer_lines(settings, result, calibration),
         *set_lines(sets, result.inference.hypotheses.names),
         *control_lines(controls, settings.top),
+        *area_lines(area),
         f"demonstrations  {count} used, {counted(len(problems), 'file')} not used",
         *refutation_lines(result.inference),
         *diagnosis_lines(diagnosis, space.names, unreachable, count),
@@ -144,10 +149,8 @@ def _exported_calibration(settings: RecordedSettings, notes: list[Remark]) -> Ca
     """The calibration that comes with a point's exported demonstrations, if these are ranked."""
     given = settings.demonstrations
     paths = [given] if isinstance(given, str) else given
-    if len(paths) != 1:
-        return None
     folder = user_path(paths[0]) / CALIBRATION
-    if not folder.is_dir():
+    if len(paths) != 1 or not folder.is_dir():
         return None
     calibration = exported_calibration(settings, Store(folder))
     notes.append(Remark(shown_path(folder), _NOT_EXPORTED if calibration is None else _EXPORTED))
@@ -217,6 +220,7 @@ def _save(
     checks: Sequence[Plausibility],
     sets: SetPosterior | None,
     controls: ControlInference | None,
+    area: AreaBelief | None,
 ) -> Path:
     """Write tables, map and record into a folder of their own, named by what went in."""
     space, inference = settings.model.space, result.inference
@@ -233,6 +237,7 @@ def _save(
     tables = {
         "hypotheses": ranking_table(inference),
         **demonstration_tables(demonstrations, inference),
+        **({} if area is None else {"area": area_table(area)}),
     }
     if controls is not None:
         tables["controls"] = controls.to_frame()
@@ -243,6 +248,7 @@ def _save(
         **result.record(),
         "sets": None if sets is None else set_record(sets, inference.hypotheses.names),
         "controls": None if controls is None else control_record(controls),
+        "area": None if area is None else area_record(area),
         "recordings": [each.record(space) for each in checks],
     }
     replace_file(folder / "answer.json", json_bytes(answer_record))

@@ -91,7 +91,7 @@ def sample_crossings(
         raise ValueError("no trajectory reaches a goal: nothing to sample")
     log_z, cell = distribution.log_z, np.full(count, distribution.start)
     first = distribution.start_moves
-    move = _draw(first, log_z[1], cell, rng)
+    move = draw_among(first, log_z[1], cell, rng)
     crossed, cells, moves = first.crosses(move, len(model.regions)), [first.successor[move]], []
     if steps == 1:
         return crossed
@@ -102,11 +102,13 @@ def sample_crossings(
     if moves:
         crossed |= model.crossed(np.stack(cells[:-1], axis=1), np.stack(moves, axis=1))
     last = distribution.goal_moves
-    move = _draw(last, log_z[steps], cells[-1], rng)
+    move = draw_among(last, log_z[steps], cells[-1], rng)
     return crossed | last.crosses(move, len(model.regions))
 
 
-def _draw(moves: MergedMoves, log_z_after: Floats, cell: Ints, rng: np.random.Generator) -> Ints:
+def draw_among(
+    moves: MergedMoves, log_z_after: Floats, cell: Ints, rng: np.random.Generator
+) -> Ints:
     """(count,) for each cell (count,), one of the moves that begin in it, by its probability."""
     value = moves.log_weight + log_z_after[moves.successor]
     drawn = np.empty(len(cell), dtype=np.int64)

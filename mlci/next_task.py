@@ -165,8 +165,10 @@ def next_tasks(
         progress: likewise.
 
     Raises:
-        ValueError: as of `simulate_tasks`.
+        ValueError: a count below 0, or as of `simulate_tasks`.
     """
+    if count < 0:
+        raise ValueError(f"tasks that are named are counted from 0 up, not {count}")
     simulated = simulate_tasks(
         model,
         inference,

@@ -12,6 +12,9 @@ from mlci.regions import Regions
 from mlci.shapes.membership import volume_share
 from mlci.spaces import Floats
 
+_LEAST = 1e-15  # share of a volume: its largest power is still a number
+LARGEST_POWER = 20.0  # a region of half the size is then a million times as probable
+
 
 def region_sizes(regions: Regions) -> Floats:
     """Size (C,) of each region: the share of the state space's volume that it holds."""
@@ -31,11 +34,14 @@ def weights_by_size(regions: Regions, power: float) -> Floats | None:
     probable, and the weights None.
 
     Raises:
-        ValueError: a power below 0.
+        ValueError: a power below 0, or above `LARGEST_POWER`.
     """
-    if not 0 <= power < np.inf:
-        raise ValueError(f"the power of a prior by size must be at least 0, not {power}")
+    if not 0 <= power <= LARGEST_POWER:
+        raise ValueError(
+            f"the power of a prior by size lies between 0 and {LARGEST_POWER:g}, not {power}; 1 "
+            "makes a region of half the size twice as probable"
+        )
     if power == 0:
         return None
     sizes = region_sizes(regions)
-    return np.where(sizes > 0, np.maximum(sizes, np.finfo(float).tiny) ** -power, 0.0)
+    return np.where(sizes > 0, np.maximum(sizes, _LEAST) ** -power, 0.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from constraint_studies import control_tables, soft_tables, transfer_tables
 from figure_study import cell_boxes, dimension_rows, path_rows, region_rows
-from method_studies import baseline_differences, chosen_task_tables
+from method_studies import baseline_differences, chosen_task_tables, early_overlap_tables
 
 LIMITS = ("", "_low", "_high")
 
@@ -262,7 +262,8 @@ def wrong_model_tables() -> dict[str, pd.DataFrame]:
 
 def area_cover_tables() -> dict[str, pd.DataFrame]:
     """Four squares, one method better than the next."""
-    methods, sizes = ["single", "neighbourhood", "greedy", "climb"], [1, 2, 4]
+    methods = ["single", "neighbourhood", "greedy", "climb", "likeliest", "shapes"]
+    methods, sizes = [*methods, "ideal", "shown"], [1, 2, 4]
     curve = [
         {"demonstrations": size, "method": name, "iou": iou, "iou_low": iou - 0.05}
         | {"iou_high": iou + 0.05}
@@ -277,7 +278,9 @@ def area_cover_tables() -> dict[str, pd.DataFrame]:
     of_x = {"truth": "t", "unit": "m", "lower": 0.0, "upper": 2.0, "periodic": False}
     return {
         "area_curve": pd.DataFrame(curve),
-        "area_map": cell.assign(in_truth=[0.6, 0, 0, 0], climb_4=[0.8, 0.2, 0.0, 0.0]),
+        "area_map": cell.assign(
+            in_truth=[0.6, 0, 0, 0], climb_4=[0.2, 0.2, 0.0, 0.0], shapes_4=[0.8, 0.2, 0.0, 0.0]
+        ),
         "hypotheses": boxes,
         "regions": pd.DataFrame([truth | {"upper_x": 0.9, "upper_y": 0.9}]),
         "dimensions": pd.DataFrame([{"name": name, **of_x} for name in "xy"]),
@@ -302,4 +305,5 @@ def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
         "area_cover": area_cover_tables(),
         "baselines": {"baseline_differences": baseline_differences()},
         "chosen_tasks": chosen_task_tables(),
+        "early_overlap": {"early_overlap": early_overlap_tables()["early_overlap"]},
     }

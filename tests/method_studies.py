@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from experiments.collate.chosen_tasks import chosen_tasks, unfound
+from experiments.collate.chosen_tasks import chosen_tasks, early_overlap, unfound
 from paper_figures.baselines import METHODS
 
 
@@ -39,6 +39,9 @@ def chosen_task_tables() -> dict[str, pd.DataFrame]:
             "best_overlaps": number % 2,
             "two_overlap": 0,
             "area_overlaps": np.nan,
+            "likeliest_overlaps": way == "chosen",
+            "likeliest_precision": 0.5,
+            "likeliest_share": 0.1,
         }
         for truth in ("c1", "cell_65")
         for source in ("model", "demonstrator")
@@ -47,3 +50,18 @@ def chosen_task_tables() -> dict[str, pd.DataFrame]:
     ]
     table = pd.DataFrame(rows)
     return {"chosen_tasks": chosen_tasks(table), "unfound": unfound(table)}
+
+
+def early_overlap_tables() -> dict[str, pd.DataFrame]:
+    """One truth: the area overlaps after all chosen tasks, and after no random ones."""
+    rows = [
+        {"truth": "pain", "cells": 4, "seed": number // 4, "source": source, "repetition": number}
+        | {"way": way, "tried": 10, "sure": np.nan, "settled": 6.0, "best_overlaps": number % 2}
+        | {"two_overlap": 0, "area_overlaps": 1, "likeliest_overlaps": way == "chosen"}
+        | {"likeliest_precision": 0.5, "likeliest_share": 0.1}
+        for source in ("model", "demonstrator")
+        for number in range(8)
+        for way in ("chosen", "random")
+    ]
+    table = pd.DataFrame(rows)
+    return {"early_overlap": early_overlap(table), "chosen_tasks": chosen_tasks(table)}

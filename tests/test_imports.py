@@ -18,6 +18,7 @@ PACKAGES = ("mlci", "experiments", "paper_figures")
 # that. A package's name stands for its modules, which may import each other.
 MLCI = {
     "mlci.actuation": "",
+    "mlci.areas": "",
     "mlci.control": "",
     "mlci.safety": "",
     "mlci.sampled": "",
@@ -91,6 +92,10 @@ MLCI = {
     "mlci.worlds.inference": "mlci.worlds.causal_entropy mlci.evidence "
     "mlci.worlds.first_exit mlci.worlds.fixed_horizon",
     "mlci.baselines": "mlci.misfit",
+    "mlci.areas.prior_shapes": "mlci.regions mlci.shapes.balls",
+    "mlci.areas.overlap": "mlci.spaces",
+    "mlci.areas.evidence": "mlci.misfit mlci.evidence",
+    "mlci.areas.belief": "mlci.areas.evidence mlci.areas.overlap mlci.credible_sets",
     "mlci.diagnosis": "mlci.tabular",
     "mlci.end_moves": "mlci.tabular",
     "mlci.recursions": "mlci.compiled mlci.tabular",

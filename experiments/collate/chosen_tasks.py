@@ -19,7 +19,14 @@ from experiments.collate.intervals import TAILS, Floats, resamples
 ALL = "all"  # the truth of rows over all truths together
 WAYS = ("chosen", "random")
 EVENTS = ("sure", "settled")  # what is counted until; see the points' table
-EARLY = ("best_overlaps", "two_overlap", "area_overlaps")
+EARLY = (
+    "best_overlaps",
+    "two_overlap",
+    "area_overlaps",
+    "likeliest_overlaps",
+    "likeliest_precision",
+    "likeliest_share",
+)
 
 
 def chosen_tasks(next_task: pd.DataFrame) -> pd.DataFrame:

@@ -142,7 +142,9 @@ def read_table_config(tree: Mapping[str, Any]) -> TableSettings:
     if isinstance(rates, Mapping):
         tree = {
             **tree,
-            "inference": _without(rates, ("exact_ends", "calibrate", "size_prior", "sets")),
+            "inference": _without(
+                rates, ("exact_ends", "calibrate", "size_prior", "sets", "shapes")
+            ),
         }
     settings = checked(TableSettings, tree)
     _refuse(table_problems(settings))

@@ -30,6 +30,7 @@ def shape_problems(settings: ModelSettings) -> Iterator[str]:
     """A grid, actions or hypotheses that do not match the system."""
     yield from _grid_problems(settings.grid, settings.model.space)
     yield from _subject_problems(settings)
+    yield from _area_problems(settings)
 
 
 def point_shape_problems(settings: Settings) -> Iterator[str]:
@@ -150,6 +151,21 @@ def _listed_problems(group: str, listed: ShapeList, space: StateSpace) -> Iterat
             except ValueError as error:
                 where = f"{group}.{key}"
                 yield str(error) if str(error).startswith(where) else f"{where}: {error}"
+
+
+def _area_problems(settings: ModelSettings) -> Iterator[str]:
+    """Shapes whose sizes leave nothing to draw, or that no dimension bounds."""
+    shapes, cells = settings.inference.shapes, settings.hypotheses.shape
+    if shapes.smallest > shapes.largest:
+        yield (
+            f"inference.shapes.smallest: {shapes.smallest} is above inference.shapes.largest: "
+            f"{shapes.largest}; give a smaller one"
+        )
+    if shapes.count and cells is not None and all(count is None for count in cells):
+        yield (
+            f"inference.shapes.count: {shapes.count}, but hypotheses.shape leaves every dimension "
+            "free, and shapes are bounded where its cells are; set it to 0"
+        )
 
 
 def _offset_problems(offset: tuple[float, ...] | None, space: StateSpace) -> Iterator[str]:

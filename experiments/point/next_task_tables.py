@@ -19,6 +19,8 @@ import pandas as pd
 from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
 from experiments.point.streams import Purpose, stream
+from mlci.best_areas import area_scores
+from mlci.credible_sets import neighbours
 from mlci.demonstrations import Task
 from mlci.evidence import posterior, rank_evidence, total_gain
 from mlci.inference import Inference
@@ -36,6 +38,8 @@ _OF_MODEL = 2  # streams of its demonstrations; 0 and 1 are of the sources' pool
 
 COLUMNS = ["source", "repetition", "way", "tried", "sure", "settled"]
 COLUMNS += ["best_overlaps", "two_overlap", "area_overlaps"]
+_LIKELIEST = ("likeliest_overlaps", "likeliest_precision", "likeliest_share")  # area
+COLUMNS += _LIKELIEST
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +62,9 @@ def next_task_table(settings: Settings, point: PointInference) -> pd.DataFrame:
         `tried`, how many demonstrations were made; `sure`, after how many the truth came first
         with a posterior above 0.95, and `settled`, from how many on it came first until all were
         made, both missing where that never was; and, after five, whether the best region, both of
-        the best two, and the most probable area of the credible set overlap the truth.
+        the best two, and the most probable area of the credible set overlap the truth; and of the
+        most probable area (`mlci.best_areas`) whether it does, the share of its regions that do,
+        and the share of all regions that it takes.
     """
     pools = {"model": _model_pool(settings, point), "demonstrator": _own_pool(settings, point)}
     rows = []
@@ -112,9 +118,13 @@ def _early(settings: Settings, inference: Inference) -> dict[str, float]:
     """What of the first demonstrations' answer overlaps the truth."""
     overlaps = inference.hypotheses.overlaps(settings.constraint)
     if len(inference.names) < EARLY or not overlaps.any():
-        return dict.fromkeys(("best_overlaps", "two_overlap", "area_overlaps"), np.nan)
+        return dict.fromkeys(("best_overlaps", "two_overlap", "area_overlaps", *_LIKELIEST), np.nan)
     best, areas = overlaps[inference.order[:2]], inference.credible.areas
+    hypotheses = inference.hypotheses
+    likeliest = area_scores(inference.gain[None], neighbours(hypotheses), overlaps)
+    values = (likeliest.overlap, likeliest.precision, likeliest.share)
     return {
+        **dict(zip(_LIKELIEST, (float(value[0]) for value in values), strict=True)),
         "best_overlaps": int(best[0]),
         "two_overlap": int(np.all(best)),
         "area_overlaps": int(bool(areas) and np.any(overlaps[areas[0].regions])),

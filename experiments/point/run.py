@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from experiments.belief_lines import control_lines, set_lines
+from experiments.belief_lines import area_lines, control_lines, set_lines
 from experiments.config.settings import Settings
 from experiments.console import (
     answer_lines,
@@ -15,9 +15,11 @@ from experiments.console import (
     measure_lines,
     trial_lines,
 )
+from experiments.point.area_shapes import area_belief, area_table
 from experiments.point.dynamics_tables import dynamics_table
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
+from experiments.point.streams import Purpose, stream
 from experiments.point.tables import point_tables
 from experiments.point.transfer_tables import transfer_tables
 from experiments.progress import begin
@@ -51,6 +53,15 @@ def run_point(
         log(line)
     for line in control_lines(inferred.controls, top):
         log(line)
+    area = area_belief(
+        settings,
+        inferred.model,
+        inferred.demonstrations,
+        inference,
+        stream(settings.seed, Purpose.AREAS, 3),
+    )
+    for line in area_lines(area):
+        log(line)
     if inferred.calibration is not None:
         for line in entry("calibration", inferred.calibration.summary()):
             log(line)
@@ -63,6 +74,8 @@ def run_point(
     begin("measuring")
     measures = measure_point(settings, inferred)
     tables = point_tables(settings, inferred, measures, result.misfit)
+    if area is not None:
+        tables["area"] = area_table(area)
     if settings.transfer.strengths:
         begin("with stronger and weaker controls")
         tables |= transfer_tables(settings, inferred, store)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
+from paper_figures.report.chosen_for_claim_6 import chosen_tasks
 from paper_figures.report.markdown import between, count, number, percent, table
 from paper_figures.report.study_tables import Missing, Results, command
 from paper_figures.report.verdict import Check, Claim, Part
@@ -145,6 +146,7 @@ def _numbers(results: Results, rows: pd.DataFrame) -> str:
         "with it by common borders and are at least half as probable. An "
         "area that takes many regions overlaps the truth easily.\n\n"
         + _areas(results)
+        + f"\n{chosen_tasks(results)}"
         + "\nBoth of the best two, when one choice is changed, after "
         + " and ".join(str(size) for size in sizes)
         + " demonstrations. *Evidence* is the mean probability that an agent without constraint, "

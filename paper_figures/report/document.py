@@ -96,6 +96,11 @@ CLAIMS: tuple[tuple[Callable[[Results], Claim], tuple[Figure, ...]], ...] = (
                 "success_cases_pain",
                 "One choice changed at a time, and success against evidence.",
             ),
+            Figure(
+                "next_task_telescope",
+                "early_overlap",
+                "What the answer after five demonstrations overlaps, chosen and random tasks.",
+            ),
         ),
     ),
 )

@@ -210,6 +210,9 @@ def test_tasks_that_the_model_cannot_do_are_passed_over() -> None:
     assert [each.name for each in chosen] == ["even"]
     with pytest.raises(ValueError, match="at least one trajectory"):
         next_tasks(model, inference, [even], samples=0)
+    with pytest.raises(ValueError, match="counted from 0 up, not -1"):
+        next_tasks(model, inference, [even], count=-1, exact_ends=False)
+    assert next_tasks(model, inference, [even], count=0, exact_ends=False) == []
 
 
 def test_what_is_left_out_as_implausible_holds_a_thousandth() -> None:

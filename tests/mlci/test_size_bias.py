@@ -39,8 +39,11 @@ def test_sizes_and_weights() -> None:
         weights = weights_by_size(REGIONS, power)
         assert weights is not None
         np.testing.assert_allclose(weights, sizes**-power)
-    with pytest.raises(ValueError, match="at least 0, not -1"):
+    with pytest.raises(ValueError, match="lies between 0 and 20, not -1"):
         weights_by_size(REGIONS, -1.0)
+    assert np.all(np.isfinite(weights_by_size(REGIONS, 20.0)))
+    with pytest.raises(ValueError, match="lies between 0 and 20, not 1000000000"):
+        weights_by_size(REGIONS, 1e9)
 
 
 def test_posterior_has_the_prior_by_size() -> None:

@@ -16,7 +16,7 @@ from mlci.regions import Regions
 from mlci.spaces import Bools, Box
 from mlci.systems import DoubleIntegrator
 from mlci.tabular import TabularModel, action_grid, discretize
-from mlci.ties import tie_class, tube_cells
+from mlci.ties import TieClass, cells_inside, tie_class, tube_cells
 
 CELLS, MOVES, PARTS = 9, 3, 4
 
@@ -122,6 +122,10 @@ def with_gains(model: TabularModel, avoidance: list[float]) -> Inference:
         ([0.2, 0.2, 0.5], 0, [1], []),  # `wall` explains much less: `fast` is no part of its tube
         ([0.25, 0.2, 0.2], 1, [2], []),  # 0.22 nat tell `fast` from the others
         ([0.25, 0.5, 0.2], 2, [], []),  # and `wall` from `fast`, though it lies in its tube
+        ([0.2, 0.2, 0.2 * np.exp(0.09)], 2, [], [0]),  # below a tenth of a nat
+        ([0.2, 0.2, 0.2 * np.exp(0.11)], 0, [1], []),  # and above
+        ([0.5, 0.2 * np.exp(1e-6), 0.2], 2, [], []),  # nearly the same, and no part of the tube
+        ([0.5, 0.2 * np.exp(1e-10), 0.2], 1, [2], []),  # the same but for rounding
         ([0.0, 0.3, 0.0], 2, [], [0]),  # what nothing avoids ties
         ([1.0, 1.0, 1.0], 0, [], []),  # nothing is explained
     ],
@@ -163,3 +167,19 @@ def test_hypotheses_are_numbered_among_the_regions_of_the_model() -> None:
     )
     ties = tie_class(model, few, some)
     assert (ties.preferred, ties.tube.tolist()) == (1, [0])
+
+
+def test_of_many_members_the_first_eight_are_named() -> None:
+    names = tuple("abcdefghijk")
+    eight = TieClass(0, np.arange(1, 9), np.zeros(0, dtype=int)).summary(names)
+    assert eight.endswith("from b, c, d, e, f, g, h, i with the same gain")
+    ten = TieClass(0, np.arange(1, 11), np.zeros(0, dtype=int)).summary(names)
+    assert ten.endswith("from b, c, d, e, f, g, h, i and 2 more with the same gain")
+
+
+def test_the_cells_of_a_region_are_those_whose_centres_it_holds() -> None:
+    model = braking()
+    centers = model.grid.centers
+    slow = Regions.from_boxes(model.grid.space, [Box([0.2, -0.6], [1.0, 0.0])])
+    expected = np.all((centers > [0.2, -0.6]) & (centers < [1.0, 0.0]), axis=1)
+    np.testing.assert_array_equal(cells_inside(model, slow, 0), np.flatnonzero(expected))

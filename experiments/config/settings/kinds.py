@@ -10,6 +10,8 @@ from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
+from mlci.region_sizes import LARGEST_POWER
+
 STRICT = ConfigDict(extra="forbid")  # a key that no field has is an error
 
 MULTIPLE_OF_PI = (
@@ -45,6 +47,8 @@ _READ = BeforeValidator(read_number)
 Number = Annotated[float, _READ]
 Positive = Annotated[float, Field(gt=0), _READ]
 NotNegative = Annotated[float, Field(ge=0), _READ]
+SizePower = Annotated[float, Field(ge=0, le=LARGEST_POWER), _READ]
+HalfWidth = Annotated[float, Field(gt=0, le=0.5), _READ]  # share of a range
 Share = Annotated[float, Field(ge=0, lt=1), _READ]
 DepthShare = Annotated[float, Field(ge=0, lt=0.5), _READ]
 Probability = Annotated[float, Field(gt=0, lt=1), _READ]

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from experiments.config.settings.area_shapes import AreaShapeSettings
 from experiments.config.settings.controls import ControlHypothesesSettings, ForbiddenControls
 from experiments.config.settings.kinds import (
     STRICT,
@@ -21,6 +22,7 @@ from experiments.config.settings.kinds import (
     Probability,
     Share,
     ShareOrEstimate,
+    SizePower,
     Word,
     about,
 )
@@ -222,7 +224,7 @@ class InferenceSettings:
 
     prior: Annotated[Probability, about("probability that there is no constraint at all")]
     size_prior: Annotated[
-        NotNegative,
+        SizePower,
         about(
             "a hypothesis has a prior weight of its size to the power of minus this: 0 makes all "
             "equal, 1 a region of half the size twice as probable"
@@ -249,6 +251,7 @@ class InferenceSettings:
         ),
     ]
     sets: SetSettings
+    shapes: AreaShapeSettings
 
     def rates(self, *, calibrated: bool) -> Rates:
         """The rates; that of rule breaking is 0 where it is still to be estimated."""

@@ -27,6 +27,9 @@ def table(chosen: list[float], random: list[float], tried: list[int], truth: str
             "best_overlaps": number % 2,
             "two_overlap": 0,
             "area_overlaps": np.nan,
+            "likeliest_overlaps": 1,
+            "likeliest_precision": 0.5,
+            "likeliest_share": 0.1,
         }
         for number in range(count)
         for way, values in (("chosen", chosen), ("random", random))

@@ -112,7 +112,9 @@ def changed(value: Any, name: str = "") -> Iterator[Any]:
     elif isinstance(value, bool):
         yield not value
     elif isinstance(value, str):
-        yield {"equation": "escapes", "euler": "rk4", "rk4": "euler"}.get(value, f"{value}2")
+        yield {"equation": "escapes", "euler": "rk4", "rk4": "euler", "ellipsoids": "boxes"}.get(
+            value, f"{value}2"
+        )
     elif isinstance(value, tuple):
         yield value[:-1] if len(value) > 1 else value * 2 or (0.25,)
     elif value is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,14 @@ import pytest
 from tiny_point import TINY, composed
 
 from experiments.config.read import read_config
+from experiments.point.area_ceilings import ideal_world
 from experiments.point.run import run_point
+from experiments.point.shape_ways import overlap_scores
 from experiments.tracking.store import Store
+from mlci.areas.evidence import ShapeEvidence
+from mlci.evidence import Rates
+from mlci.grids import Grid
+from mlci.spaces import Box, StateSpace
 
 
 def test_tables_of_areas(tmp_path: Path) -> None:
@@ -49,3 +56,60 @@ def test_a_truth_that_hypotheses_cover_in_part(tmp_path: Path) -> None:
     assert single["recall"] == pytest.approx(1 / 3, abs=0.03)  # 0.2 m of 0.6 m
     other = 0.2 / single["precision"] - 0.2  # of the slice that comes first
     assert single["iou"] == pytest.approx(0.2 / (0.6 + other), abs=0.03)
+
+
+SHAPES = ["inference.shapes.count=60", "inference.shapes.samples=40"]
+
+
+def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
+    """Slices of x: shapes are free in velocity, as hypotheses are, and so is the wall."""
+    words = ["areas.subsets=1", "areas.demonstrations=[3]", "hypotheses.shape=[10,null]", *SHAPES]
+    settings, lines = read_config(composed(*TINY, *words))[0], []
+    tables = run_point(settings, Store(tmp_path), lines.append)
+    rows = tables["areas"].set_index("method")
+    assert {"shapes", "likeliest", "shown"} <= set(rows.index)
+    # On 2304 points in x alone the wall is a tenth; what is shown of it is all or nothing.
+    assert rows.loc["shown", "iou"] in (0.0, 1.0)
+    assert 0 <= rows.loc["shapes", "iou"] <= 1
+    assert 0 < rows.loc["shapes", "expected"] < 1
+    assert np.isnan(rows.loc["climb", "expected"])
+    cells, area = tables["area_map"], tables["area"]
+    assert cells["shapes_3"].between(0, 1).all()
+    assert list(area.columns) == ["point", "position", "chance", "inside"]
+    assert len(area) == 2304
+    assert area["chance"].between(0, 1).all()
+    assert area["inside"].any()
+    (told,) = (line for line in lines if line.startswith("area"))
+    assert "of one or two shapes; expected overlap" in told
+    assert any("forbidden somewhere with at least" in line for line in lines)
+
+
+def test_a_perfect_belief_finds_what_an_ideal_world_forbids() -> None:
+    """Two shapes, one in the way of every trajectory but one: that one is shown."""
+    inside = np.zeros((6, 2), dtype=bool)
+    inside[:2, 0] = inside[4:, 1] = True
+    avoided = np.zeros((5, 2), dtype=bool)
+    avoided[3] = True
+    raster = Grid(StateSpace(Box([0.0], [6.0]), [False], ("place",)), (6,))
+    evidence = ShapeEvidence((avoided,), np.ones((1, 2), dtype=bool), inside, raster, Rates(0.1))
+    world = ideal_world(evidence, np.random.default_rng(0))
+    assert world is not None
+    seen, truth = world
+    assert not seen.violated.any()
+    np.testing.assert_array_equal(truth, inside.any(axis=1))
+    unable = replace(evidence, avoided=(None,))
+    assert ideal_world(unable, np.random.default_rng(0)) is None
+    walled = replace(evidence, avoided=(np.zeros((5, 2), dtype=bool),))
+    assert ideal_world(walled, np.random.default_rng(0)) is None
+
+
+def test_overlaps_of_areas() -> None:
+    area, truth = np.array([1, 1, 1, 0], bool), np.array([0, 0, 1, 1], bool)
+    assert overlap_scores(area, truth) == {
+        "iou": 1 / 4,
+        "precision": 1 / 3,
+        "recall": 1 / 2,
+    }
+    nothing = np.zeros(4, dtype=bool)
+    assert np.isnan(overlap_scores(nothing, truth)["precision"])
+    assert np.isnan(overlap_scores(nothing, nothing)["iou"])

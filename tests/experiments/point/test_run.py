@@ -76,7 +76,10 @@ def test_baselines_are_ranked_on_the_subsets_of_ranks(point: tuple) -> None:
         of_size, one = ranks[ranks["demonstrations"] == name], group.set_index("method")
         assert one.loc["ours", "rank"] == pytest.approx(of_size["rank"].mean())
         assert one.loc["ours", "top"] == pytest.approx(of_size["share_top_4"].mean())
+        assert one.loc["ours", "first"] == pytest.approx((of_size["rank"] == 1).mean())
         assert len(one) == 6
+    ours = rows[rows["method"] == "ours"]
+    assert 0 < ours["first"].mean() < ours["top"].mean()
     assert (rows.loc[rows["method"] == "uniform", "first"] == 0).all()
     assert rows["log_rank"].between(0, np.log(rows["rank"]) + 1e-12).all()
 

@@ -8,6 +8,7 @@ from soft_worlds import enumerated, toy_world
 
 from mlci.demonstrations import Demonstration
 from mlci.evidence import Rates, log_evidence
+from mlci.forecasts import ForecastCurve, ForecastMap
 from mlci.grids import Grid
 from mlci.likelihood_interval import DROP
 from mlci.maxent import TrajectoryDistribution
@@ -17,6 +18,7 @@ from mlci.simulate import rollout
 from mlci.soft.distribution import SoftModel
 from mlci.soft.weight import (
     SoftShares,
+    WeightEstimate,
     best_forgiven,
     estimate_weights,
     soft_evidence,
@@ -226,3 +228,54 @@ def test_a_region_that_cannot_be_avoided_has_a_weight_too() -> None:
     shares = tabulate_shares([task])
     assert np.all(np.isfinite(shares.table))
     assert shares.log_share(0.7) == pytest.approx(task.log_share(0.7), rel=SHARE)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "verdict"),
+    [
+        (0.0, 3.0, "perhaps no constraint"),
+        (0.0, np.inf, "undecided"),
+        (0.5, 3.0, "soft"),
+        (0.5, np.inf, "as a wall"),
+    ],
+)
+def test_verdicts_and_records_of_intervals(lower: float, upper: float, verdict: str) -> None:
+    estimate = WeightEstimate("r", 1.0, lower, upper, 2.0, -np.inf, 0.5, 0.25, 3)
+    assert estimate.verdict == verdict
+    record = estimate.record()
+    assert record["verdict"] == verdict
+    assert record["upper"] == (None if np.isinf(upper) else upper)
+    assert record["hard_to_soft"] is None
+    assert (record["region"], record["weight"], record["lower"]) == ("r", 1.0, lower)
+
+
+def test_evidence_of_weights_by_hand() -> None:
+    """((1 - eps) e^(-w t) / ((1 - eta) A + eta) + eps), for one inside and one who is not."""
+    share, inside = np.log([0.3, 0.6]), np.array([0.5, 0.0])
+    rates = Rates(0.2, 0.1)
+    a = 0.8 * np.array([0.3, 0.6]) + 0.2
+    expected = np.log(0.9 * np.exp(-2 * inside) / a + 0.1)
+    np.testing.assert_allclose(soft_evidence(2.0, share, inside, rates), expected, rtol=1e-12)
+    wall = np.log(0.9 * np.array([0, 1]) / a + 0.1)
+    np.testing.assert_allclose(soft_evidence(np.inf, share, inside, rates), wall, rtol=1e-12)
+
+
+def test_times_that_no_demonstrations_have_are_refused() -> None:
+    shares = shares_of(toy_world(0))
+    for times in ([0.1, 0.2], [-0.1], []):
+        with pytest.raises(ValueError, match="1 tasks need as many times of at least 0 s"):
+            shares.estimate(times)
+    with pytest.raises(ValueError, match="at least one task"):
+        tabulate_shares([])
+
+
+def test_calibrated_evidence_gives_way_to_the_default_model_error() -> None:
+    """A map says nothing of weights; rule breaking stays."""
+    model, paths = _planar()
+    plain = infer(model, paths, rates=Rates(0.1, 0.05))
+    curve = ForecastCurve((0.01, 0.02), 20, 100, 0.0, 1.0, 0.0, 0.9)
+    mapped = replace(plain, calibration=ForecastMap((curve,)), rates=Rates(0.0, 0.05))
+    (one,), (other,) = (estimate_weights(model, paths, each, regions=0) for each in (plain, mapped))
+    assert one == other
+    (paper,) = estimate_weights(model, paths, replace(plain, rates=Rates(0.0, 0.05)), regions=0)
+    assert paper != one

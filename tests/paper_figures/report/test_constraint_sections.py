@@ -1,11 +1,15 @@
-"""Sections on soft constraints and on transfer, by tables whose numbers are known."""
+"""Sections on soft constraints, transfer, areas and chosen tasks, by tables of known numbers."""
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
+from choice_studies import area_cover_tables
 from constraint_studies import control_tables, soft_tables, transfer_tables
+from method_studies import early_overlap_tables
 
-from paper_figures.report import section_controls, section_soft, section_transfer
+from paper_figures.report import section_areas, section_controls, section_soft, section_transfer
+from paper_figures.report.chosen_for_claim_6 import chosen_tasks
 from paper_figures.report.study_tables import Missing, Results
 
 
@@ -70,3 +74,46 @@ def test_transfer_of_points_that_are_of_no_case_is_missing(tmp_path: Path) -> No
     some = results(tmp_path, "transfer", {**tables, "cases": tables["cases"][:1]})
     with pytest.raises(Missing, match="cannot be read: some points are of no case"):
         section_transfer.section(some)
+
+
+def area_curve() -> pd.DataFrame:
+    """The methods' overlap, and what else the section tells."""
+    curve = area_cover_tables()["area_curve"].assign(regions=2.0, seeds=10, expected=0.5)
+    scores = {f"{name}{end}": 0.5 for name in ("precision", "recall") for end in ("", "_low")}
+    return curve.assign(**scores, precision_high=0.6, recall_high=0.6)
+
+
+def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
+    text = section_areas.section(results(tmp_path / "with", "areas", {"area_curve": area_curve()}))
+    # 0.1 + 0.1 k + 0.2 after four demonstrations, of the fourth, sixth, seventh and eighth method.
+    assert "With 4 demonstrations it reaches 0.80 [0.75, 0.85], against 0.60 of squares" in text
+    assert "and expects 0.50" in text
+    assert "overlap all of it by 1.0 [0.95, 1.1]" in text
+    assert "the same inference reaches 0.90 [0.85, 0.95]" in text
+    # Ceilings reach nothing: they know the truth.
+    assert "best area of shapes reaches 0.6 with 1" in text
+    assert "all of the truth that was shown reaches" not in text
+
+    cells = area_curve().query("method in ['single', 'greedy', 'climb']").drop(columns="expected")
+    text = section_areas.section(results(tmp_path / "without", "areas", {"area_curve": cells}))
+    assert "shapes" not in text
+
+
+def test_what_five_chosen_tasks_do_for_claim_6(tmp_path: Path) -> None:
+    tables = early_overlap_tables()
+    text = chosen_tasks(results(tmp_path / "with", "next_task_telescope", tables))
+    assert "over 8 pools from 2 sets of tasks" in text
+    (line,) = (line for line in text.splitlines() if "| simulated demonstrator | chosen |" in line)
+    shares = [cell.split(" %")[0].strip() for cell in line.split("|")[3:-1]]
+    assert shares == ["50", "0", "100", "50", "10"]
+    assert (
+        "the most probable area overlaps the truth in 100 % [100, 100 %], more than 0 % [0, 0 %] "
+        "after random ones" in text
+    )
+    assert "overlap it in 0 % [0, 0 %], which the intervals do not tell apart from 0 %" in text
+
+
+def test_claim_6_says_how_to_choose_tasks_where_nobody_did(tmp_path: Path) -> None:
+    text = chosen_tasks(Results(tmp_path))
+    assert "Tasks that are chosen: the study `next_task_telescope` has no table" in text
+    assert "experiment=next_task_telescope` makes it." in text
