@@ -15,7 +15,6 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-import mlci.preparation
 from experiments import infer_table
 from experiments.app import DONE, FAILED, run_command
 from experiments.belief_lines import control_lines, set_lines
@@ -28,6 +27,7 @@ from experiments.page.beliefs import belief_sentences
 from experiments.page.document import page
 from experiments.point.controls import control_record, recorded_controls
 from experiments.point.forecasts import exported_calibration, recorded_calibration
+from experiments.point.ranking import ranked
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import (
     plausibilities,
@@ -38,7 +38,7 @@ from experiments.point.recorded import (
 from experiments.point.recorded_next import recorded_next_tasks
 from experiments.point.recorded_tables import demonstration_tables, path_table
 from experiments.point.sets import set_belief, set_record
-from experiments.point.stages import discretized_model
+from experiments.point.stages import formed_model
 from experiments.progress import begin, steps_shown
 from experiments.terminal import complain, counted, entry, say
 from experiments.tracking.environment import environment
@@ -51,6 +51,7 @@ from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
 from mlci.inference import Inference
+from mlci.models import Model
 from mlci.plot import draw_map, png
 from mlci.recordings.files import user_path
 from mlci.recordings.plausibility import Plausibility, summary
@@ -106,22 +107,27 @@ def infer(settings: RecordedSettings) -> int:
     results = writable_results(settings)
     checks = plausibilities(settings, demonstrations)
     say(doubt_lines(checks))
-    begin("forming the tabular model")
-    model = discretized_model(settings, settings.candidates)
+    begin("forming the model")
+    model = formed_model(settings, settings.candidates)
     if settings.inference.calibrate and calibration is None:
         store = Store(results / "store")
         calibration = recorded_calibration(settings, model, demonstrations, store)
     result = _answer(settings, model, demonstrations, calibration, summary(checks))
     begin("weighing sets of hypotheses")
     sets = set_belief(settings, model, demonstrations, result.inference, np.random.default_rng(0))
-    controls = recorded_controls(settings, model, demonstrations)
+    cells = model if isinstance(model, TabularModel) else None
+    controls = None if cells is None else recorded_controls(settings, cells, demonstrations)
     begin("drawing the map")
     # All is saved before it is printed, in case nobody reads on.
     folder = _save(settings, demonstrations, problems, result, checks, sets, controls)
-    diagnosis, count = diagnose(model), len(demonstrations)
+    diagnosis = None if cells is None else diagnose(cells)
+    count = len(demonstrations)
     unreachable = int(np.sum(~result.inference.reachable))
     doubtful = [check for check in checks if check.doubts]
-    concerns = list(diagnosis.concerns(space.names, unreachable, count))
+    concerns, moving = [], list[str]()
+    if diagnosis is not None:
+        concerns = diagnosis.concerns(space.names, unreachable, count)
+        moving = list(diagnosis_lines(diagnosis, space.names, unreachable, count))
     beliefs = belief_sentences(sets, result.inference.hypotheses.names, controls)
     content = _page(settings, readings, result, calibration, doubtful, concerns, beliefs)
     replace_file(folder / "page.html", content)
@@ -132,7 +138,7 @@ def infer(settings: RecordedSettings) -> int:
         *control_lines(controls, settings.top),
         f"demonstrations  {count} used, {counted(len(problems), 'file')} not used",
         *refutation_lines(result.inference),
-        *diagnosis_lines(diagnosis, space.names, unreachable, count),
+        *moving,
         f"written: {shown_path(folder)}",
         f"page: {shown_path(folder / 'page.html')}",
     ):
@@ -156,7 +162,7 @@ def _exported_calibration(settings: RecordedSettings, notes: list[Remark]) -> Ca
 
 def _answer(
     settings: RecordedSettings,
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     calibration: Calibration | None,
     doubts: Sequence[str],
@@ -165,7 +171,8 @@ def _answer(
     begin(f"ranking {len(settings.candidates)} hypotheses")
     forecast_map = None if calibration is None else calibration.map
     exact_ends = settings.inference.exact_ends
-    inference = mlci.preparation.infer(
+    inference = ranked(
+        settings,
         model,
         demonstrations,
         prior_none=settings.inference.prior,
@@ -179,7 +186,7 @@ def _answer(
     if settings.inference.rule_breaking == ESTIMATE:
         inference = inference.with_rule_breaking()
     temperature = None
-    if settings.estimate_temperature:
+    if settings.estimate_temperature and isinstance(model, TabularModel):
         begin("estimating the temperature")
         temperature = estimate_temperature(
             model, demonstrations, inference, round_horizon=True, exact_ends=exact_ends

@@ -39,7 +39,9 @@ def point_page(facts: Facts) -> str:
     inferred = infer_point(settings, Store(facts.point.results / "store"))
     regions = inferred.inference.hypotheses
     calibration, names = inferred.calibration, settings.model.space.names
-    concerns = inferred.diagnosis.concerns(names, inferred.unreachable, len(inferred.numbers))
+    concerns, tasks = [], len(inferred.numbers)
+    if inferred.diagnosis is not None:
+        concerns = inferred.diagnosis.concerns(names, inferred.unreachable, tasks)
     return page(
         point_answer(settings, inferred),
         inferred.demonstrations,
@@ -47,7 +49,7 @@ def point_page(facts: Facts) -> str:
         about=_about(settings, inferred.inference),
         beliefs=belief_sentences(inferred.sets, regions.names, inferred.controls),
         assumed=[] if calibration is None else [calibration.summary()],
-        doubtful=list(concerns),
+        doubtful=concerns,
         truth=settings.constraint,
     )
 

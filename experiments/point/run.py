@@ -56,10 +56,10 @@ def run_point(
             log(line)
     for line in trial_lines(inferred.trials.counts()):
         log(line)
-    for line in diagnosis_lines(
-        inferred.diagnosis, space.names, inferred.unreachable, len(inferred.numbers)
-    ):
-        log(line)
+    if inferred.diagnosis is not None:
+        tasks = len(inferred.numbers)
+        for line in diagnosis_lines(inferred.diagnosis, space.names, inferred.unreachable, tasks):
+            log(line)
     begin("measuring")
     measures = measure_point(settings, inferred)
     tables = point_tables(settings, inferred, measures, result.misfit)
