@@ -20,6 +20,7 @@ from experiments.app import DONE, FAILED, run_command
 from experiments.config.read import ConfigError, read_advice_config
 from experiments.config.settings import AdviceSettings
 from experiments.console import noise_words
+from experiments.point.model_choice import choose_model, formed_cells
 from experiments.success_rule import SuccessRule, chance_word, chance_words, read_rule
 from experiments.terminal import entry, table_lines, terminal_width, words
 from mlci.demonstrations import Demonstration
@@ -29,7 +30,6 @@ from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.outlook.outlook import Outlook, outlook
 from mlci.spaces import Bools
-from mlci.tabular import discretize
 
 _SAMPLES = 100  # of the paths that show which tasks can be done
 # A remedy that takes more moves is not tried: some 30 s and 1 GB.
@@ -120,6 +120,7 @@ def advise(settings: AdviceSettings, log: Callable[[str], None]) -> int:
     chosen, reasons = recommend(candidates)
     if chosen is None:
         log("recommended     none: raise budget, add larger dts or grids, or try another remedy")
+        choose_model(settings, paths, None, settings.dts[0], log)
         return FAILED
     shape = ",".join(map(str, chosen.grid.shape))
     log(
@@ -131,6 +132,8 @@ def advise(settings: AdviceSettings, log: Callable[[str], None]) -> int:
     if chosen.known is not None:
         for line in entry("works", " ".join(chance_words(chosen.known, rule))):
             log(line)
+    cells = formed_cells(settings, chosen.grid, chosen.dt, chosen.samples)
+    choose_model(settings, paths, cells, chosen.dt, log)
     return DONE
 
 
@@ -226,9 +229,7 @@ def _try(
 ) -> Candidate:
     """Form a tabular model and see what it can do."""
     before = time.process_time()
-    model = discretize(
-        settings.model, grid, settings.action_values, dt, settings.candidates, samples
-    )
+    model = formed_cells(settings, grid, dt, samples)
     formed = time.process_time() - before
     known = outlook(model, paths)
     task_s = np.nan

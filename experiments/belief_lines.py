@@ -1,8 +1,9 @@
-"""What a person reads on the terminal of beliefs beside the ranking: sets of regions, controls."""
+"""What a person reads on the terminal of beliefs beside the ranking: sets, controls, areas."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +15,23 @@ from mlci.areas.belief import AreaBelief
 from mlci.sets.posterior import SetPosterior
 
 _AREAS, _MARGINALS = 3, 5  # that are printed
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """Beliefs beside that over single regions; each None where nobody asked."""
+
+    names: Sequence[str]  # of the hypotheses
+    sets: SetPosterior | None
+    controls: ControlInference | None
+    area: AreaBelief | None
+
+
+def belief_lines(beliefs: Beliefs, top: int) -> Iterator[str]:
+    """What is believed beside the ranking, of all that was asked; `top` ranges of controls."""
+    yield from set_lines(beliefs.sets, beliefs.names)
+    yield from control_lines(beliefs.controls, top)
+    yield from area_lines(beliefs.area)
 
 
 def set_lines(sets: SetPosterior | None, names: Sequence[str]) -> Iterator[str]:

@@ -88,6 +88,8 @@ def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) 
     if len(credible.areas) > _AREAS:
         yield from entry("", f"and {len(credible.areas) - _AREAS} more")
     yield from entry("assumed", "; ".join(answer.assumptions))
+    if answer.rank_errors is not None:
+        yield from entry("samples", sampled_words(answer))
     yield from entry("rests on", _carrier_words(answer))
     yield from entry("", _left_out_words(answer))
     if answer.ties is not None and len(answer.ties.others):
@@ -97,6 +99,26 @@ def answer_lines(answer: Answer, top: int, truth: Container[int] = frozenset()) 
     yield from _next_lines(answer)
     for warning in answer.warnings:
         yield from entry("warning", warning)
+
+
+def sampled_words(answer: Answer) -> str:
+    """Which ranks are settled where probabilities are sampled, and how surely these are known."""
+    inference, errors = answer.inference, answer.rank_errors
+    sampling = inference.sampling
+    if errors is None or sampling is None:
+        return "none: nothing is sampled"
+    vague = np.all(sampling.unresolved(inference.avoidance), axis=0)
+    words = [
+        errors.summary(inference.order, inference.hypotheses.names),
+        f"standard errors of Phi are {np.max(sampling.errors):.2g} at most, with "
+        f"{np.min(sampling.effective):.0f} effective samples of a task or more",
+    ]
+    if vague.any():
+        words.append(
+            f"of {int(np.sum(vague))} regions the samples resolve no more than that they are "
+            "hardly ever entered, or avoided"
+        )
+    return "; ".join(words)
 
 
 def refutation_lines(inference: Inference) -> list[str]:

@@ -15,10 +15,9 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-import mlci.preparation
 from experiments import infer_table
 from experiments.app import DONE, FAILED, run_command
-from experiments.belief_lines import area_lines, control_lines, set_lines
+from experiments.belief_lines import Beliefs, belief_lines
 from experiments.config.paths import results_folder
 from experiments.config.read import read_recorded_config, writable_results
 from experiments.config.settings import ESTIMATE, RecordedSettings
@@ -26,9 +25,9 @@ from experiments.console import answer_lines, diagnosis_lines, doubt_lines, refu
 from experiments.lookback.recordings import CALIBRATION
 from experiments.page.beliefs import belief_sentences
 from experiments.page.document import page
-from experiments.point.area_shapes import area_belief, area_record, area_table
-from experiments.point.controls import control_record, recorded_controls
+from experiments.point.beliefs import belief_record, belief_tables, recorded_beliefs
 from experiments.point.forecasts import exported_calibration, recorded_calibration
+from experiments.point.ranking import ranked
 from experiments.point.ranking_tables import ranking_table
 from experiments.point.recorded import (
     plausibilities,
@@ -38,27 +37,24 @@ from experiments.point.recorded import (
 )
 from experiments.point.recorded_next import recorded_next_tasks
 from experiments.point.recorded_tables import demonstration_tables, path_table
-from experiments.point.sets import set_belief, set_record
-from experiments.point.stages import discretized_model
+from experiments.point.stages import formed_model
 from experiments.progress import begin, steps_shown
 from experiments.terminal import complain, counted, entry, say
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, json_bytes, replace_file
 from experiments.tracking.store import Store
 from experiments.tracking.trees import canonical_json, plain
-from mlci.actuation.inference import ControlInference
 from mlci.answers import Answer, answer
-from mlci.areas.belief import AreaBelief
 from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import diagnose
 from mlci.inference import Inference
+from mlci.models import Model
 from mlci.plot import draw_map, png
 from mlci.recordings.files import user_path
 from mlci.recordings.plausibility import Plausibility, summary
 from mlci.recordings.read import Readings
 from mlci.recordings.recording import Remark, shown_path
-from mlci.sets.posterior import SetPosterior
 from mlci.tabular import TabularModel
 from mlci.temperature import estimate_temperature
 
@@ -108,36 +104,34 @@ def infer(settings: RecordedSettings) -> int:
     results = writable_results(settings)
     checks = plausibilities(settings, demonstrations)
     say(doubt_lines(checks))
-    begin("forming the tabular model")
-    model = discretized_model(settings, settings.candidates)
+    begin("forming the model")
+    model = formed_model(settings, settings.candidates)
     if settings.inference.calibrate and calibration is None:
         store = Store(results / "store")
         calibration = recorded_calibration(settings, model, demonstrations, store)
     result = _answer(settings, model, demonstrations, calibration, summary(checks))
-    begin("weighing sets of hypotheses")
-    sets = set_belief(settings, model, demonstrations, result.inference, np.random.default_rng(0))
-    controls = recorded_controls(settings, model, demonstrations)
-    begin("weighing areas of one or two shapes")
-    area = area_belief(settings, model, demonstrations, result.inference, np.random.default_rng(0))
+    beliefs = recorded_beliefs(settings, model, demonstrations, result.inference)
     begin("drawing the map")
     # All is saved before it is printed, in case nobody reads on.
-    folder = _save(settings, demonstrations, problems, result, checks, sets, controls, area)
-    diagnosis, count = diagnose(model), len(demonstrations)
+    folder = _save(settings, demonstrations, problems, result, checks, beliefs)
+    diagnosis = diagnose(model) if isinstance(model, TabularModel) else None
+    count = len(demonstrations)
     unreachable = int(np.sum(~result.inference.reachable))
     doubtful = [check for check in checks if check.doubts]
-    concerns = list(diagnosis.concerns(space.names, unreachable, count))
-    beliefs = belief_sentences(sets, result.inference.hypotheses.names, controls)
-    content = _page(settings, readings, result, calibration, doubtful, concerns, beliefs)
+    concerns, moving = [], list[str]()
+    if diagnosis is not None:
+        concerns = diagnosis.concerns(space.names, unreachable, count)
+        moving = list(diagnosis_lines(diagnosis, space.names, unreachable, count))
+    sentences = belief_sentences(beliefs)
+    content = _page(settings, readings, result, calibration, doubtful, concerns, sentences)
     replace_file(folder / "page.html", content)
     begin("")
     for line in (
         *_answer_lines(settings, result, calibration),
-        *set_lines(sets, result.inference.hypotheses.names),
-        *control_lines(controls, settings.top),
-        *area_lines(area),
+        *belief_lines(beliefs, settings.top),
         f"demonstrations  {count} used, {counted(len(problems), 'file')} not used",
         *refutation_lines(result.inference),
-        *diagnosis_lines(diagnosis, space.names, unreachable, count),
+        *moving,
         f"written: {shown_path(folder)}",
         f"page: {shown_path(folder / 'page.html')}",
     ):
@@ -159,7 +153,7 @@ def _exported_calibration(settings: RecordedSettings, notes: list[Remark]) -> Ca
 
 def _answer(
     settings: RecordedSettings,
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     calibration: Calibration | None,
     doubts: Sequence[str],
@@ -168,7 +162,8 @@ def _answer(
     begin(f"ranking {len(settings.candidates)} hypotheses")
     forecast_map = None if calibration is None else calibration.map
     exact_ends = settings.inference.exact_ends
-    inference = mlci.preparation.infer(
+    inference = ranked(
+        settings,
         model,
         demonstrations,
         prior_none=settings.inference.prior,
@@ -182,7 +177,7 @@ def _answer(
     if settings.inference.rule_breaking == ESTIMATE:
         inference = inference.with_rule_breaking()
     temperature = None
-    if settings.estimate_temperature:
+    if settings.estimate_temperature and isinstance(model, TabularModel):
         begin("estimating the temperature")
         temperature = estimate_temperature(
             model, demonstrations, inference, round_horizon=True, exact_ends=exact_ends
@@ -218,9 +213,7 @@ def _save(
     problems: Sequence[Remark],
     result: Answer,
     checks: Sequence[Plausibility],
-    sets: SetPosterior | None,
-    controls: ControlInference | None,
-    area: AreaBelief | None,
+    beliefs: Beliefs,
 ) -> Path:
     """Write tables, map and record into a folder of their own, named by what went in."""
     space, inference = settings.model.space, result.inference
@@ -237,18 +230,14 @@ def _save(
     tables = {
         "hypotheses": ranking_table(inference),
         **demonstration_tables(demonstrations, inference),
-        **({} if area is None else {"area": area_table(area)}),
+        **belief_tables(beliefs),
     }
-    if controls is not None:
-        tables["controls"] = controls.to_frame()
     for name, table in tables.items():
         replace_file(folder / f"{name}.csv", csv_bytes(table))
     replace_file(folder / "map.png", _map(inference, demonstrations))
     answer_record = {
         **result.record(),
-        "sets": None if sets is None else set_record(sets, inference.hypotheses.names),
-        "controls": None if controls is None else control_record(controls),
-        "area": None if area is None else area_record(area),
+        **belief_record(beliefs),
         "recordings": [each.record(space) for each in checks],
     }
     replace_file(folder / "answer.json", json_bytes(answer_record))

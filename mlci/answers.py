@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, singledispatch
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,10 @@ from mlci.demonstrations import Demonstration
 from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.json_numbers import finite
-from mlci.maxent import TrajectoryDistribution
 from mlci.misfit import SAMPLES, Misfit, misfit
+from mlci.models import Model, distribution_of
 from mlci.next_task import NextTask
+from mlci.rank_errors import RankErrors, rank_errors, sampling_record
 from mlci.regions import Regions
 from mlci.shapes.membership import volume_share
 from mlci.shapes.shape import Cuboid
@@ -43,7 +44,7 @@ class Answer:
         misfit: how the demonstrations compare with the model's own trajectories.
         unseen: numbers of the regions that none of the tasks could have shown.
         cut: (C, n) whether a hypothesis has a side in a dimension that is no border of cells.
-        temperature: of the tabular model.
+        temperature: of the model.
         exact_ends: whether its trajectories begin and end at states, not at cells.
         temperature_estimate: the temperature that the demonstrations look like, if it is known.
         doubts: about the recordings themselves, such as `mlci.recordings.plausibility.summary`.
@@ -70,6 +71,11 @@ class Answer:
         """How gains go with the sizes of regions; None where all are of one size."""
         return size_bias(self.inference)
 
+    @cached_property
+    def rank_errors(self) -> RankErrors | None:
+        """How surely ranks are known; None where nothing is sampled."""
+        return None if self.inference.sampling is None else rank_errors(self.inference)
+
     @property
     def assumptions(self) -> list[str]:
         """What the answer takes for granted, a phrase each."""
@@ -89,6 +95,7 @@ class Answer:
             else f"temperature {self.temperature:g} ({estimate.summary()})",
             f"paths begin and end at {'states' if self.exact_ends else 'cells'}",
             str(inference.crossing),
+            *([] if inference.sampling is None else ["probabilities from sampled paths, no cells"]),
         ]
 
     def record(self) -> dict[str, Any]:
@@ -135,6 +142,7 @@ class Answer:
             "temperature_estimate": None
             if self.temperature_estimate is None
             else self.temperature_estimate.record(),
+            "sampling": self.rank_errors and sampling_record(inference, self.rank_errors),
             "tie_class": self.ties and self.ties.record(names),
             "weights": [estimate.record() for estimate in self.weights],
             "size_bias": None if self.size_bias is None else self.size_bias.record(),
@@ -152,7 +160,7 @@ class Answer:
         )
         if rare := names[self.misfit.is_rare].tolist():
             phrases.append(
-                f"the tabular model finds {len(rare)} of {len(names)} demonstrations nearly "
+                f"the model finds {len(rare)} of {len(names)} demonstrations nearly "
                 f"impossible (p < 0.01; by chance 1 in 50): {listed(rare)}"
             )
         if self.temperature_estimate is not None:
@@ -177,7 +185,7 @@ class Answer:
 
 
 def answer(
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     inference: Inference,
     *,
@@ -193,7 +201,7 @@ def answer(
     """Look at an inference from all sides.
 
     Args:
-        model: the tabular model.
+        model: the model.
         demonstrations: the N that the inference is from.
         inference: what `infer` made of them, with the arguments below.
         hypotheses: (C',) mask over the model's regions; None takes all.
@@ -206,11 +214,10 @@ def answer(
         next_tasks: what `mlci.next_task.next_tasks` says is to be recorded next.
     """
     distributions = (
-        TrajectoryDistribution.of_task(
-            model, each.task, round_horizon=round_horizon, exact_ends=exact_ends
-        )
+        distribution_of(model, each.task, round_horizon=round_horizon, exact_ends=exact_ends)
         for each in demonstrations
     )
+    cut, ties = of_cells(model, inference, hypotheses)
     return Answer(
         inference=inference,
         support=support(inference),
@@ -222,15 +229,30 @@ def answer(
             samples=samples,
         ),
         unseen=unseen(inference),
-        cut=cut_by(model.grid, inference.hypotheses),
+        cut=cut,
         temperature=model.temperature,
         exact_ends=exact_ends,
         temperature_estimate=temperature,
         doubts=tuple(doubts),
-        ties=tie_class(model, inference, hypotheses),
+        ties=ties,
         weights=tuple(weights),
         next_tasks=tuple(next_tasks),
     )
+
+
+@singledispatch
+def of_cells(
+    model: Model, inference: Inference, hypotheses: Bools | None
+) -> tuple[Bools, TieClass | None]:
+    """What only cells tell: `Answer.cut` and `Answer.ties`; nothing without cells."""
+    return np.zeros(inference.hypotheses.lower.shape, dtype=bool), None
+
+
+@of_cells.register
+def _(
+    model: TabularModel, inference: Inference, hypotheses: Bools | None
+) -> tuple[Bools, TieClass | None]:
+    return cut_by(model.grid, inference.hypotheses), tie_class(model, inference, hypotheses)
 
 
 def unseen(inference: Inference) -> Ints:

@@ -20,12 +20,13 @@ from mlci.crossings import ANY, Crossing, crossed
 from mlci.demonstrations import REACHED, Demonstration, Task
 from mlci.forecast_scores import ForecastScores, score_forecasts
 from mlci.forecasts import ForecastMap, fit_map, is_possible
+from mlci.models import Model
 from mlci.preparation import prepare
 from mlci.region_sizes import region_sizes
 from mlci.regions import Regions, as_mask
 from mlci.similar_tasks import similar_demonstrations
 from mlci.spaces import Bools, Box
-from mlci.tabular import Progress, TabularModel
+from mlci.tabular import Progress
 
 FEWEST = 20  # demonstrations from which a map can be fitted and judged
 
@@ -69,7 +70,7 @@ class Calibration:
 
 
 def calibrate(
-    model: TabularModel,
+    model: Model,
     tasks: Sequence[Task | Demonstration],
     *,
     hypotheses: ArrayLike | None = None,
@@ -92,7 +93,7 @@ def calibrate(
     (`mlci.demonstrator.demonstrate`, with at least 100 Runge-Kutta steps a task).
 
     Args:
-        model: the tabular model.
+        model: the model.
         tasks: tasks, or demonstrations of them; the trials' tasks are drawn from a smooth
             distribution through them, see `mlci.similar_tasks`.
         hypotheses: (C,) mask over the model's regions; None takes all.
@@ -139,7 +140,7 @@ def calibrate(
 
 
 def calibrate_on(
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     *,
     tried: int | None = None,
@@ -152,7 +153,7 @@ def calibrate_on(
     """Calibrate the forecasts of a model by demonstrations of agents whom nothing constrains.
 
     Args:
-        model: the tabular model.
+        model: the model.
         demonstrations: of tasks in random order: the first half fits, the second is judged.
         tried: how many tasks were tried; by default as many as there are demonstrations.
         hypotheses: (C,) mask over the model's regions; None takes all.

@@ -180,7 +180,7 @@ class Inference:
         found = [] if self.sampling is None else self.sampling.warnings(self.names)
         if lost := [name for name, can in zip(self.names, self.reachable, strict=True) if not can]:
             found.append(
-                f"the tabular model cannot reach the goal of {', '.join(lost)}: evidence against "
+                f"the model cannot reach the goal of {', '.join(lost)}: evidence against "
                 "what they violate, and for nothing"
             )
         regions = np.array(self.hypotheses.names)

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import singledispatch
 
 import numpy as np
 
 from mlci.maxent import TrajectoryDistribution
 from mlci.merged_moves import MergedMoves
+from mlci.models import Distribution
+from mlci.sampled.distribution import SampledDistribution
 from mlci.spaces import Bools, Floats, Ints
 
 SAMPLES = 249  # of each task: p of two sides is then 2 / 250 at least, which is below RARE
@@ -44,7 +47,7 @@ class Misfit:
 
 
 def misfit(
-    distributions: Iterable[TrajectoryDistribution],
+    distributions: Iterable[Distribution],
     phi: Floats,
     violated: Bools,
     *,
@@ -75,14 +78,24 @@ def misfit(
     return Misfit(count, distance, count_p, distance_p)
 
 
-def sample_crossings(
-    distribution: TrajectoryDistribution, count: int, rng: np.random.Generator
-) -> Bools:
-    """(count, C) which of the model's regions trajectories cross, drawn by the soft optimal policy.
+@singledispatch
+def sample_crossings(distribution: Distribution, count: int, rng: np.random.Generator) -> Bools:
+    """(count, C) which of the model's regions trajectories cross, drawn by the soft optimal policy,
+    or from those that were sampled before.
 
     Raises:
         ValueError: no trajectory reaches a goal.
     """
+    raise TypeError(f"a {type(distribution).__name__} is no distribution of a task")
+
+
+@sample_crossings.register
+def _of_samples(distribution: SampledDistribution, count: int, rng: np.random.Generator) -> Bools:
+    return distribution.crossings(count, rng)
+
+
+@sample_crossings.register
+def _of_cells(distribution: TrajectoryDistribution, count: int, rng: np.random.Generator) -> Bools:
     model, steps = distribution.model, distribution.steps
     if distribution.ends is None:
         path, taken = distribution.sample(count, rng)

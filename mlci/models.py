@@ -20,6 +20,7 @@ from mlci.spaces import Bools, Floats
 from mlci.tabular import TabularModel
 
 Model = TabularModel | SampledModel
+NO_CELLS_AT_ENDS = "a sampled model has no cells: its trajectories begin and end at states"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,35 @@ class Forecast:
     avoidance: Floats
     decided: Bools
     sampling: SamplingErrors | None = None
+
+
+Distribution = TrajectoryDistribution | SampledDistribution
+
+
+@singledispatch
+def distribution_of(
+    model: Model, task: Task, *, round_horizon: bool = False, exact_ends: bool = True
+) -> Distribution:
+    """The distribution of a task; arguments and errors as of `forecasters`."""
+    raise TypeError(f"a TabularModel or a SampledModel tells of tasks, not {type(model).__name__}")
+
+
+@distribution_of.register
+def _tabular_distribution(
+    model: TabularModel, task: Task, *, round_horizon: bool = False, exact_ends: bool = True
+) -> Distribution:
+    return TrajectoryDistribution.of_task(
+        model, task, round_horizon=round_horizon, exact_ends=exact_ends
+    )
+
+
+@distribution_of.register
+def _sampled_distribution(
+    model: SampledModel, task: Task, *, round_horizon: bool = False, exact_ends: bool = True
+) -> Distribution:
+    if not exact_ends:
+        raise ValueError(NO_CELLS_AT_ENDS)
+    return model.distribution(task, round_horizon=round_horizon)
 
 
 @singledispatch
@@ -70,7 +100,7 @@ def _of_cells(
     ]
     if tasks:
         _ = model.merged  # once for all tasks
-    return [partial(tabular_forecast, distribution) for distribution in distributions]
+    return [partial(forecast_of, distribution) for distribution in distributions]
 
 
 @forecasters.register
@@ -78,14 +108,30 @@ def _of_samples(
     model: SampledModel, tasks: Sequence[Task], *, round_horizon: bool, exact_ends: bool
 ) -> list[Callable[[], Forecast]]:
     if not exact_ends:
-        raise ValueError("a sampled model has no cells: its trajectories begin and end at states")
+        raise ValueError(NO_CELLS_AT_ENDS)
     for task in tasks:
         model.passage(task, round_horizon=round_horizon)
-    return [partial(_sampled_forecast, model, task, round_horizon=round_horizon) for task in tasks]
+
+    def forecast(task: Task) -> Forecast:
+        distribution = model.distribution(task, round_horizon=round_horizon)
+        return forecast_of(distribution, model.replicates)
+
+    return [partial(forecast, task) for task in tasks]
 
 
-def tabular_forecast(distribution: TrajectoryDistribution) -> Forecast:
-    """The forecast of a tabular distribution."""
+@singledispatch
+def forecast_of(distribution: Distribution, replicates: int = 0) -> Forecast:
+    """The forecast of a task by its distribution.
+
+    Args:
+        distribution: of the task.
+        replicates: of probabilities that are sampled.
+    """
+    raise TypeError(f"a {type(distribution).__name__} is no distribution of a task")
+
+
+@forecast_of.register
+def _tabular_forecast(distribution: TrajectoryDistribution, replicates: int = 0) -> Forecast:
     count = len(distribution.model.regions)
     nothing = np.zeros(count, dtype=bool)
     if not distribution.is_possible:
@@ -97,16 +143,18 @@ def tabular_forecast(distribution: TrajectoryDistribution) -> Forecast:
     return Forecast(True, avoidance, nothing)
 
 
-def _sampled_forecast(model: SampledModel, task: Task, *, round_horizon: bool) -> Forecast:
-    """The forecast of a task by its samples."""
-    distribution: SampledDistribution = model.distribution(task, round_horizon=round_horizon)
-    count = len(model.regions)
-    nothing, complaints = np.zeros(count, dtype=bool), (tuple(distribution.diagnosis.complaints),)
+@forecast_of.register
+def _sampled_forecast(distribution: SampledDistribution, replicates: int = 0) -> Forecast:
+    count, diagnosis = len(distribution.regions), distribution.diagnosis
+    nothing, complaints = np.zeros(count, dtype=bool), (tuple(diagnosis.complaints),)
+    effective = np.array([diagnosis.effective])
     if not distribution.is_possible:
-        certain = np.ones((model.replicates, 1, count))
-        of_none = SamplingErrors(np.zeros((1, count)), certain, complaints)
+        certain = np.ones((replicates, 1, count))
+        of_none = SamplingErrors(np.zeros((1, count)), certain, complaints, effective)
         return Forecast(False, np.ones(count), nothing, of_none)
     errors = distribution.avoidance_errors()[None]
-    replicates = distribution.avoidance_replicates(model.replicates)[:, None]
-    sampling = SamplingErrors(errors, replicates, complaints)
-    return Forecast(True, distribution.avoidance_probabilities(), nothing, sampling)
+    moved = distribution.avoidance_replicates(replicates)[:, None]
+    sampling = SamplingErrors(errors, moved, complaints, effective)
+    # Nothing is unavoidable only because no sample avoids it.
+    alpha = np.maximum(distribution.avoidance_probabilities(), distribution.least)
+    return Forecast(True, alpha, nothing, sampling)

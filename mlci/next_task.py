@@ -19,12 +19,11 @@ from mlci.calibration import certain_by_ends
 from mlci.demonstrations import Task
 from mlci.inference import Inference
 from mlci.json_numbers import finite
-from mlci.maxent import TrajectoryDistribution
 from mlci.misfit import sample_crossings
-from mlci.models import tabular_forecast
+from mlci.models import Model, distribution_of, forecast_of
 from mlci.regions import as_mask
 from mlci.spaces import Floats, StateSpace
-from mlci.tabular import Progress, TabularModel
+from mlci.tabular import Progress
 from mlci.task_outcomes import TaskOutcomes, as_forecast, task_outcomes
 
 SAMPLES = 500  # trajectories drawn for each task
@@ -73,7 +72,7 @@ class NextTask:
 
 
 def simulate_tasks(
-    model: TabularModel,
+    model: Model,
     inference: Inference,
     tasks: Sequence[Task],
     *,
@@ -84,13 +83,13 @@ def simulate_tasks(
     exact_ends: bool = True,
     progress: Progress | None = None,
 ) -> list[TaskOutcomes | None]:
-    """What demonstrations of each task may show; None where the tabular model cannot do it.
+    """What demonstrations of each task may show; None where the model cannot do it.
 
     A region that holds a task's start or goal counts for nothing there: whoever keeps out of it
     would not do the task, and nobody should be asked to.
 
     Args:
-        model: the tabular model.
+        model: the model.
         inference: its hypotheses, rates and calibration say what counts as evidence.
         tasks: the tasks.
         hypotheses: as of `mlci.preparation.infer`, for the inference.
@@ -109,10 +108,10 @@ def simulate_tasks(
     simulated: list[TaskOutcomes | None] = []
     for number, task in enumerate(tasks):
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
-        distribution = TrajectoryDistribution.of_task(
+        distribution = distribution_of(
             model, task, round_horizon=round_horizon, exact_ends=exact_ends
         )
-        of_task = tabular_forecast(distribution)
+        of_task = forecast_of(distribution)
         if of_task.possible:
             alpha = of_task.avoidance[None, mask]
             decided = of_task.decided[None, mask] | certain_by_ends(inference.hypotheses, [task])
@@ -132,7 +131,7 @@ def simulate_tasks(
 
 
 def next_tasks(
-    model: TabularModel,
+    model: Model,
     inference: Inference,
     tasks: Sequence[Task],
     *,
@@ -151,7 +150,7 @@ def next_tasks(
     rates and calibration say.
 
     Args:
-        model: the tabular model.
+        model: the model.
         inference: what is believed.
         tasks: the candidates; those that the model cannot do, or that are nearly one of the chosen,
             are passed over.
@@ -196,7 +195,7 @@ def next_tasks(
         chosen.append(NextTask(task, best, name, information, error, chance))
         futures = np.repeat(beliefs, _FUTURES, axis=0) if len(beliefs) == 1 else beliefs
         beliefs = of_best.learnt(futures, rng)
-        space = model.grid.space
+        space = model.regions.space
         outcomes = {
             number: of_task
             for number, of_task in outcomes.items()

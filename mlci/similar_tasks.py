@@ -9,9 +9,9 @@ import numpy as np
 
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import Outcome, Trial, demonstrate, first_guesses
+from mlci.models import Model
 from mlci.simulate import RK4
 from mlci.spaces import Bools, Box, Floats, StateSpace
-from mlci.tabular import TabularModel
 
 _SAMPLES = 100  # of a simulated path, at least; Runge-Kutta steps are exact enough with fewer
 _HOLDS = 10  # controls that a first guess holds
@@ -19,7 +19,7 @@ _ATTEMPTS = 100  # to draw a task inside the state space
 
 
 def similar_demonstrations(
-    model: TabularModel,
+    model: Model,
     tasks: Sequence[Task | Demonstration],
     trials: int,
     rng: np.random.Generator,
@@ -30,7 +30,7 @@ def similar_demonstrations(
     """What a simulated demonstrator does, without a constraint, of tasks like some.
 
     Args:
-        model: the tabular model, whose time step divides the durations.
+        model: the model, whose time step divides the durations.
         tasks: tasks, or demonstrations of them.
         trials: tasks that are tried; those that the demonstrator fails are left out.
         rng: of tasks and first guesses.
@@ -41,7 +41,7 @@ def similar_demonstrations(
         ValueError: no task.
     """
     plain = [each.task if isinstance(each, Demonstration) else each for each in tasks]
-    drawn = similar_tasks(model.grid.space, plain, trials, rng)
+    drawn = similar_tasks(model.regions.space, plain, trials, rng)
     paths: list[Demonstration] = []
     by_steps: dict[int, list[Task]] = {}
     for task in drawn:

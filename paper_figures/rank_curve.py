@@ -134,5 +134,5 @@ def _draw_rank(axes: Axes, curve: pd.DataFrame, style: dict[str, Any]) -> None:
     """Median and quartiles."""
     x = curve["demonstrations"]
     axes.fill_between(x, curve["q25"], curve["q75"], color=style["color"], alpha=0.15, linewidth=0)
-    label = f"{curve['cells'].iloc[0]} cells"
+    label = f"{curve['cells'].iloc[0]} cells" if curve["cells"].iloc[0] else "no cells"
     axes.plot(x, curve["median"], label=label, **style)

@@ -18,11 +18,14 @@ _BYTES_A_MOVE = 100
 _MERGED_AN_ACTION, _BYTES_A_MERGED_MOVE = 4, 50
 _BYTES_A_STEP = 16  # and cell: log Z, and which cells can be occupied
 _BYTES_A_HYPOTHESIS = 30_000  # while crossings are found
+_COPIES_OF_PATHS, _COPIES_OF_CROSSINGS = 6, 3  # of sampled paths, at most, while they are weighed
 _BYTES_AT_REST = 200_000_000  # the interpreter, its packages, and blocks of work
 
 
 def expected_memory(settings: ModelSettings) -> float:
-    """Bytes that a point takes at most for its tabular model and the inference."""
+    """Bytes that a point takes at most for its model and the inference."""
+    if settings.sampling is not None:
+        return _of_samples(settings, settings.sampling.most)
     cells = math.prod(settings.grid.shape)
     dimensions = settings.model.space.dimension
     actions = math.prod(settings.action_counts)
@@ -39,6 +42,21 @@ def expected_memory(settings: ModelSettings) -> float:
         + min(ALPHA_BYTES, float(cells) * hypotheses * 16)
         + _BYTES_AT_REST
     )
+
+
+def _of_samples(settings: ModelSettings, samples: int) -> float:
+    """Bytes that the paths of one task take: states and controls, and copies as these are weighed.
+
+    A model of recorded demonstrations does not know how long these take.
+    """
+    if not isinstance(settings, Settings) or settings.sampling is None:
+        return _BYTES_AT_REST
+    steps = settings.horizon / settings.dt
+    numbers = steps * settings.sampling.substeps * settings.model.space.dimension
+    hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
+    hypotheses += settings.hypotheses.count
+    copies = _COPIES_OF_PATHS * numbers + _COPIES_OF_CROSSINGS * hypotheses
+    return samples * copies * 8 + _BYTES_AT_REST
 
 
 def machine_memory() -> float:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from experiments.config.memory import expected_memory, machine_memory
 from experiments.config.settings import (
@@ -55,6 +56,8 @@ def count_problems(settings: Settings) -> Iterator[str]:
         )
     yield from _division_problems("dt", settings.dt, settings.horizon)
     yield from _division_problems("demonstrations.dt", demonstrations.dt, settings.horizon)
+    for i, step in enumerate(settings.models.steps):
+        yield from _division_problems(f"models.steps[{i}]", step, settings.horizon)
 
 
 def advice_count_problems(settings: AdviceSettings) -> Iterator[str]:
@@ -89,6 +92,61 @@ def soft_problems(settings: RecordedSettings) -> Iterator[str]:
             f"soft: {settings.soft}, but a weight needs every single move, and {moves} are more "
             f"than the {MOST_KEPT} that are kept; use fewer cells, actions or samples, or soft=0"
         )
+
+
+def point_cell_problems(settings: Settings) -> Iterator[str]:
+    """What a point asks of cells, where paths are sampled."""
+    asked = {
+        "next_task.repetitions": (settings.next_task.repetitions, 0),
+        "baselines.paths": (settings.baselines.paths, 0),
+        "calibration.sets": (settings.calibration.sets, 0),
+        "soft.weights": (list(settings.soft.weights), []),
+        "dynamics.tasks": (settings.dynamics.tasks, 0),
+    }
+    yield from _cell_problems(settings, asked)
+
+
+def recorded_cell_problems(settings: RecordedSettings) -> Iterator[str]:
+    """What is asked of cells beside recorded demonstrations, where paths are sampled."""
+    asked = {
+        "soft": (settings.soft, 0),
+        "estimate_temperature": (settings.estimate_temperature, False),
+    }
+    yield from _cell_problems(settings, asked)
+
+
+def _cell_problems(settings: ModelSettings, asked: Mapping[str, tuple[Any, Any]]) -> Iterator[str]:
+    """What needs cells though there are none, by its key: its value, and the one that asks nothing.
+
+    Also a budget that is smaller than what is drawn at once.
+    """
+    sampling = settings.sampling
+    if sampling is None:
+        return
+    asked = {
+        "inference.exact_ends": (settings.inference.exact_ends, True),
+        "inference.shapes.count": (settings.inference.shapes.count, 0),
+        "transition.samples": (settings.transition.samples, 1),
+        "hypotheses.controls.ranges": (list(settings.hypotheses.controls.ranges), []),
+        "hypotheses.controls.shares": (list(settings.hypotheses.controls.shares), []),
+        **asked,
+    }
+    for key, (value, nothing) in asked.items():
+        if value != nothing:
+            yield (
+                f"{key}: {_word(value)} needs cells, and model=sampled has none; set it to "
+                f"{_word(nothing)}, or take model=tabular"
+            )
+    if sampling.most < sampling.samples:
+        yield (
+            f"sampled.most: {sampling.most} is less than the {sampling.samples} of "
+            "sampled.samples; raise it, or lower samples"
+        )
+
+
+def _word(value: Any) -> str:
+    """A value as YAML spells it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _division_problems(key: str, dt: float, horizon: float) -> Iterator[str]:

@@ -25,6 +25,8 @@ from experiments.config.number_checks import (
     advice_count_problems,
     budget_problems,
     count_problems,
+    point_cell_problems,
+    recorded_cell_problems,
     size_problems,
     soft_problems,
     study_problems,
@@ -82,7 +84,7 @@ def read_config(tree: Mapping[str, Any]) -> tuple[Settings, StudySettings]:
     everything = checked(RunSettings, tree)
     settings, study = _part(Settings, everything), _part(StudySettings, everything)
     # Each group of checks relies on the one before.
-    _refuse(study_problems(study), count_problems(settings))
+    _refuse(study_problems(study), count_problems(settings), point_cell_problems(settings))
     _refuse(shape_problems(settings), point_shape_problems(settings), truth_problems(settings))
     _refuse(size_problems(settings))
     _refuse(hypothesis_problems(settings), control_truth_problems(settings))
@@ -125,7 +127,11 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
         if isinstance(box, Mapping):
             used["next_tasks"] = {**chosen, "box": {"goal": None, **_without(box, ("crossing",))}}
     settings = checked(RecordedSettings, used)
-    _refuse(shape_problems(settings), recorded_shape_problems(settings))
+    _refuse(
+        shape_problems(settings),
+        recorded_shape_problems(settings),
+        recorded_cell_problems(settings),
+    )
     _refuse(control_hypothesis_problems(settings))
     _refuse(size_problems(settings), soft_problems(settings))
     return settings

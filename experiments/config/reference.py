@@ -190,7 +190,7 @@ def _defaults(command: str) -> dict[str, str]:
     for group in _GROUPS:
         files = [set(flatten(values_of(path))) for path in sorted((CONF / group).glob("*.yaml"))]
         spelling |= dict.fromkeys(set.intersection(*files), f"by `{group}`")
-    spelling["system"] = "by `system`"
+    spelling |= {"system": "by `system`", "sampled.use": "by `model`"}
     return {key: "to be given" if value == "`???`" else value for key, value in spelling.items()}
 
 

@@ -1,4 +1,4 @@
-"""Sentences of the page about sets of regions, and about controls."""
+"""Sentences of the page about sets of regions, controls and areas."""
 
 from __future__ import annotations
 
@@ -6,20 +6,45 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.belief_lines import controls_assumed
+from experiments.belief_lines import Beliefs, controls_assumed
+from experiments.console import bounds
 from experiments.page.words import of_100
 from mlci.actuation.inference import ControlInference
 from mlci.answers import listed
+from mlci.areas.belief import AreaBelief
 from mlci.sets.posterior import SetPosterior
 
 _NAMED = 5  # regions, or ranges
 
 
-def belief_sentences(
-    sets: SetPosterior | None, names: Sequence[str], controls: ControlInference | None
-) -> list[str]:
-    """What is believed of sets of the regions of these names, and of controls."""
-    return [*_set_sentences(sets, names), *_control_sentences(controls)]
+def belief_sentences(beliefs: Beliefs) -> list[str]:
+    """What is believed beside the ranking of regions, where that is asked."""
+    return [
+        *_set_sentences(beliefs.sets, beliefs.names),
+        *_control_sentences(beliefs.controls),
+        *_area_sentences(beliefs.area),
+    ]
+
+
+def _area_sentences(belief: AreaBelief | None) -> list[str]:
+    """What is believed of an area of one or two shapes; nothing where that is not asked."""
+    if belief is None:
+        return []
+    none = of_100(float(belief.sizes[0]))
+    sentences = [
+        "If what is avoided has the form of one or two of the shapes that were asked for: that "
+        f"nothing is avoided, {none}."
+    ]
+    space = belief.raster.space
+    sentences += [
+        f"Likely inside what is avoided: {bounds(part.hull, space)}." for part in belief.parts[:3]
+    ]
+    if belief.parts:
+        sentences.append(
+            "This area and what is avoided are expected to share "
+            f"{belief.overlap:.2f} of all that is in either."
+        )
+    return sentences
 
 
 def _set_sentences(sets: SetPosterior | None, names: Sequence[str]) -> list[str]:

@@ -37,17 +37,18 @@ def point_page(facts: Facts) -> str:
         raise ArchiveError(f"{identity}: the source has changed since it ran; run it again first")
     settings = settings_of_record(facts.record["config"])
     inferred = infer_point(settings, Store(facts.point.results / "store"))
-    regions = inferred.inference.hypotheses
     calibration, names = inferred.calibration, settings.model.space.names
-    concerns = inferred.diagnosis.concerns(names, inferred.unreachable, len(inferred.numbers))
+    concerns, tasks = [], len(inferred.numbers)
+    if inferred.diagnosis is not None:
+        concerns = inferred.diagnosis.concerns(names, inferred.unreachable, tasks)
     return page(
         point_answer(settings, inferred),
         inferred.demonstrations,
         title=f"Point {identity[:_SHORT]}: what simulated demonstrators avoided",
         about=_about(settings, inferred.inference),
-        beliefs=belief_sentences(inferred.sets, regions.names, inferred.controls),
+        beliefs=belief_sentences(inferred.beliefs),
         assumed=[] if calibration is None else [calibration.summary()],
-        doubtful=list(concerns),
+        doubtful=concerns,
         truth=settings.constraint,
     )
 

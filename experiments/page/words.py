@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.console import NEXT_ASSUMED, bounds, task_words
+from experiments.console import NEXT_ASSUMED, bounds, sampled_words, task_words
 from experiments.terminal import words
 from mlci.answers import Answer, listed
 from mlci.regions import Regions
@@ -39,6 +39,7 @@ def answer_sentences(answer: Answer) -> list[str]:
         return [
             "No region stands out: none is more likely to be avoided than that nothing is.",
             f"How likely it is that nothing is avoided: {none}.",
+            *_sampled_sentences(answer),
         ]
     if chance >= inference.posterior_none:
         sentences = [
@@ -68,7 +69,14 @@ def answer_sentences(answer: Answer) -> list[str]:
     if answer.ties is not None and len(answer.ties.others):
         told = answer.ties.summary(regions.names)
         sentences.append(f"{told[0].upper()}{told[1:]}.")
-    return [*sentences, *_support_sentences(answer)]
+    return [*sentences, *_sampled_sentences(answer), *_support_sentences(answer)]
+
+
+def _sampled_sentences(answer: Answer) -> list[str]:
+    """How surely ranks are known, where chances are sampled."""
+    if answer.rank_errors is None:
+        return []
+    return [f"Chances are counted from sampled paths: {sampled_words(answer)}."]
 
 
 def _support_sentences(answer: Answer) -> list[str]:

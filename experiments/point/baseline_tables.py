@@ -28,7 +28,7 @@ def baseline_table(settings: Settings, point: PointInference) -> pd.DataFrame:
         `ranks.top`, and `first`, how often it is first alone. Missing without a truth that covers a
         hypothesis.
     """
-    inference, model = point.inference, point.model
+    inference, model = point.inference, point.tabular
     truth = inference.hypotheses.inside(settings.constraint)
     rng = stream(settings.seed, Purpose.BASELINES, 0)
     parts = {
@@ -72,7 +72,7 @@ def _paper_evidence(point: PointInference) -> Floats:
     avoidance = np.ones(inference.avoidance.shape)
     for j, demonstration in enumerate(point.demonstrations):
         distribution = TrajectoryDistribution.of_task(
-            point.model, demonstration.task, round_horizon=True
+            point.tabular, demonstration.task, round_horizon=True
         )
         if distribution.is_possible:
             avoidance[j] = distribution.avoidance_probabilities()[point.hypotheses]

@@ -57,7 +57,7 @@ def belief_counts(settings: Settings, point: PointInference) -> pd.DataFrame:
         inference.of(slice(first, first + longest))
         for first in range(0, len(inference.names) - longest + 1, longest)
     ]
-    constrained = point.model.under(point.truth)
+    constrained = point.tabular.under(point.truth)
     of_model = [
         _model_set(settings, point, constrained, number) for number in range(calibration.sets)
     ]
@@ -123,14 +123,14 @@ def _model_set(
     rng = stream(settings.seed, Purpose.MODEL_DEMONSTRATIONS, world, number)
     avoidance, violated = [], []
     for _ in range(max(settings.calibration.demonstrations)):
-        distribution = _possible_task(settings, point.model, rng)
+        distribution = _possible_task(settings, point.tabular, rng)
         under_truth = TrajectoryDistribution(
             constrained, distribution.start, distribution.goal, distribution.steps
         )
         if not under_truth.is_possible:
             break
         cells, moves = under_truth.sample(1, rng)
-        violated.append(point.model.crossed(cells[0, :-1], moves[0])[point.hypotheses])
+        violated.append(point.tabular.crossed(cells[0, :-1], moves[0])[point.hypotheses])
         avoidance.append(distribution.avoidance_probabilities()[point.hypotheses])
     shape = len(avoidance), len(point.inference.hypotheses)
     return Inference(

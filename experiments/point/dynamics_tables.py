@@ -49,7 +49,7 @@ def dynamics_table(
     covered = point.inference.hypotheses.inside(settings.constraint)
     features = np.full(len(FEATURES), np.nan)
     if covered.any() and paths:
-        known = outlook(point.model, paths, point.hypotheses)
+        known = outlook(point.tabular, paths, point.hypotheses)
         numbers = np.flatnonzero(covered)
         truth = numbers[np.argmax(known.crossed[numbers])]
         features = known.features(settings.ranks.demonstrations)[truth]

@@ -1,4 +1,4 @@
-"""How often the tabular model's forecasts come true, kept in the store.
+"""How often the model's forecasts come true, kept in the store.
 
 The demonstrator that inference knows of, whatever real ones are like, does tasks from the study's
 box without a constraint. So all truths, seeds and realities of a study share what it shows.
@@ -19,18 +19,18 @@ import pandas as pd
 import mlci.calibration
 import mlci.demonstrator
 from experiments.config.settings import ModelSettings, RecordedSettings, Settings
-from experiments.point.stages import model_inputs, shape_modules, system_module, tabular_model
+from experiments.point.stages import inference_model, model_inputs, shape_modules, system_module
 from experiments.point.trials import nominal_skill
 from experiments.progress import begin
 from experiments.tracking.sources import source_hash
 from experiments.tracking.store import Store
-from experiments.tracking.trees import canonical_json
+from experiments.tracking.trees import canonical_json, plain
 from mlci.calibration import Calibration, calibrate, calibrate_on
 from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.forecast_scores import BIN_COLUMNS, ForecastScores, Score
 from mlci.forecasts import ForecastCurve, ForecastMap
-from mlci.tabular import TabularModel
+from mlci.models import Model
 
 TRIALS = 200
 SEED = 1 << 32  # one more than a study can have: none of its tasks is among these
@@ -44,6 +44,7 @@ def forecast_inputs(settings: Settings) -> tuple[Any, ...]:
         replace(settings.demonstrations, pairs=TRIALS, keep=TRIALS, rule_breaking=0.0),
         replace(settings.tasks, crossing=False),
         settings.horizon,
+        settings.sampling,
         settings.inference.exact_ends,
     )
 
@@ -52,7 +53,7 @@ def forecast_calibration(settings: Settings, store: Store) -> Calibration:
     """The map of forecasts and their scores, from the store or computed."""
 
     def compute() -> dict[str, np.ndarray]:
-        model = tabular_model(settings, store)
+        model = inference_model(settings, store)
         calibration = calibrate_on(
             model,
             free_demonstrations(settings),
@@ -66,14 +67,14 @@ def forecast_calibration(settings: Settings, store: Store) -> Calibration:
     return _calibration(store.get("forecasts", forecast_inputs(settings), modules, compute))
 
 
-def free_demonstrations(settings: Settings) -> list[Demonstration]:
-    """What the demonstrator that inference knows of does without a constraint."""
+def free_demonstrations(settings: Settings, trials: int = TRIALS) -> list[Demonstration]:
+    """What the demonstrator that inference knows of does of some tasks without a constraint."""
     system, demonstrator = settings.model, settings.demonstrations
-    trials = sample_trials(
+    tasks = sample_trials(
         system,
         None,
         settings.tasks.start_box(system.space),
-        trials=TRIALS,
+        trials=trials,
         seed=SEED,
         horizon=settings.horizon,
         dt=demonstrator.dt,
@@ -81,7 +82,7 @@ def free_demonstrations(settings: Settings) -> list[Demonstration]:
         restarts=demonstrator.restarts,
         hold=demonstrator.hold,
     )
-    attempts = demonstrate(system, trials, None, None, **nominal_skill(settings))
+    attempts = demonstrate(system, tasks, None, None, **nominal_skill(settings))
     return [each.demonstration for each in attempts if each.outcome is Outcome.KEPT]
 
 
@@ -99,12 +100,12 @@ def exported_calibration(settings: RecordedSettings, exported: Store) -> Calibra
     touch counts as crossing, as it does in points, and if the source is that of now.
     """
     model, ends = model_inputs(settings, settings.candidates), settings.inference.exact_ends
-    inputs = canonical_json([model, ends])
+    inputs = canonical_json(plain([model, settings.sampling, ends]))
     source = source_hash([module.__name__ for module in _modules(settings)])
     for made_from, arrays in exported.entries("forecasts"):
         try:
             depends = made_from["depends"]
-            same = canonical_json([depends[0], depends[-1]]) == inputs
+            same = canonical_json([depends[0], *depends[-2:]]) == inputs
             if same and made_from["source"] == source and settings.crossing.crossing().is_any:
                 return _calibration(arrays)
         except (LookupError, TypeError, ValueError):  # somebody else made it
@@ -114,7 +115,7 @@ def exported_calibration(settings: RecordedSettings, exported: Store) -> Calibra
 
 def recorded_calibration(
     settings: RecordedSettings,
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     store: Store,
 ) -> Calibration:
@@ -125,6 +126,7 @@ def recorded_calibration(
     depends = (
         model_inputs(settings, settings.candidates),
         [[repr(float(number)) for number in row] for row in numbers],  # infinite sides are no JSON
+        settings.sampling,
         exact_ends,
         dataclasses.astuple(crossing),
     )

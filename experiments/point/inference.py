@@ -6,23 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.belief_lines import Beliefs
 from experiments.config.settings import ESTIMATE, Settings
+from experiments.point.area_shapes import area_belief
 from experiments.point.controls import point_controls
 from experiments.point.forecasts import forecast_calibration
 from experiments.point.no_answer import NoAnswer, why_none
+from experiments.point.ranking import ranked
 from experiments.point.sets import set_belief
-from experiments.point.stages import tabular_model
+from experiments.point.stages import inference_model
 from experiments.point.streams import Purpose, stream
 from experiments.point.trials import TrialSet, demonstrations
 from experiments.tracking.store import Store
-from mlci.actuation.inference import ControlInference
 from mlci.answers import Answer, answer
 from mlci.calibration import Calibration
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.inference import Inference
-from mlci.preparation import infer
-from mlci.sets.posterior import SetPosterior
+from mlci.models import Model
 from mlci.spaces import Bools, Ints
 from mlci.tabular import TabularModel
 
@@ -35,31 +36,40 @@ class PointInference:
         trials: all trials of the demonstrator.
         numbers: (N,) those trials that are demonstrations.
         demonstrations: (N,) the demonstrations.
-        model: the tabular model; its regions are the hypotheses and the truth's boxes.
+        model: tabular or sampled; its regions are the hypotheses and the truth's boxes.
         hypotheses: (C',) mask over the model's regions.
         truth: (C',) mask over the model's regions: the truth's boxes.
         inference: from the N demonstrations about the C hypotheses.
-        diagnosis: how the model moves.
+        diagnosis: how cells move; None where there are none.
         calibration: how often the model's forecasts come true, where evidence is to be calibrated.
-        sets: belief over sets of hypotheses, where it is asked for.
-        controls: what is believed of controls, likewise.
+        beliefs: what is believed beside the ranking, where it is asked for.
     """
 
     trials: TrialSet
     numbers: Ints
     demonstrations: tuple[Demonstration, ...]
-    model: TabularModel
+    model: Model
     hypotheses: Bools
     truth: Bools
     inference: Inference
-    diagnosis: Diagnosis
-    calibration: Calibration | None = None
-    sets: SetPosterior | None = None
-    controls: ControlInference | None = None
+    diagnosis: Diagnosis | None
+    calibration: Calibration | None
+    beliefs: Beliefs
+
+    @property
+    def tabular(self) -> TabularModel:
+        """The model, which has cells.
+
+        Raises:
+            TypeError: it has none; `experiments.config` refuses what would ask for them.
+        """
+        if not isinstance(self.model, TabularModel):
+            raise TypeError(f"this needs cells, which a {type(self.model).__name__} has not")
+        return self.model
 
     @property
     def unreachable(self) -> int:
-        """How many goals the tabular model cannot reach."""
+        """How many goals the model cannot reach."""
         return int(np.sum(~self.inference.reachable))
 
 
@@ -83,7 +93,7 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
             f"no demonstration was kept: {why}; narrow tasks, or allow "
             "more demonstrations.iterations, restarts or goal_weight, or horizon"
         )
-    model = tabular_model(settings, store)
+    model = inference_model(settings, store)
     paths = tuple(
         trials.demonstration(number, settings.horizon, settings.demonstrations.dt)
         for number in numbers
@@ -91,7 +101,8 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
     hypotheses = model.regions.mask(settings.candidates.names)
     calibration = forecast_calibration(settings, store) if settings.inference.calibrate else None
     forecast_map = None if calibration is None else calibration.map
-    inference = infer(
+    inference = ranked(
+        settings,
         model,
         paths,
         hypotheses=hypotheses,
@@ -104,6 +115,14 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
     )
     if settings.inference.rule_breaking == ESTIMATE:
         inference = inference.with_rule_breaking()
+    sets = set_belief(
+        settings, model, paths, inference, stream(settings.seed, Purpose.SETS, 0), hypotheses
+    )
+    diagnosis = controls = area = None
+    if isinstance(model, TabularModel):
+        diagnosis, controls = diagnose(model), point_controls(settings, store, model, paths)
+        of_areas = stream(settings.seed, Purpose.AREAS, 3)
+        area = area_belief(settings, model, paths, inference, of_areas)
     return PointInference(
         trials=trials,
         numbers=numbers,
@@ -112,12 +131,9 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         hypotheses=hypotheses,
         truth=model.regions.mask(settings.constraint.names),
         inference=inference,
-        diagnosis=diagnose(model),
+        diagnosis=diagnosis,
         calibration=calibration,
-        sets=set_belief(
-            settings, model, paths, inference, stream(settings.seed, Purpose.SETS, 0), hypotheses
-        ),
-        controls=point_controls(settings, store, model, paths),
+        beliefs=Beliefs(inference.hypotheses.names, sets, controls, area),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import singledispatch
 
 import numpy as np
 
@@ -13,14 +14,19 @@ from experiments.point.streams import Purpose, stream
 from mlci.demonstrations import Demonstration
 from mlci.maxent import TrajectoryDistribution
 from mlci.metrics import final_state_error, violation_distance
+from mlci.models import Model
+from mlci.sampled.distribution import SampledModel
 from mlci.simulate import rollout
 from mlci.spaces import Bools, Floats, Ints
 from mlci.systems import System
+from mlci.tabular import TabularModel
+
+_FEWEST_EFFECTIVE = 20  # samples that avoid the truth, from which a task counts as feasible
 
 
 @dataclass(frozen=True, eq=False)
 class Measures:
-    """What the tabular agent does under the truth, for each of N demonstrations.
+    """What the model does under the truth, for each of N demonstrations.
 
     Attributes:
         feasible: (N,) whether it can do the task; NaN stands in the others' measures. None if
@@ -42,37 +48,87 @@ class Measures:
     trajectories: Mapping[int, tuple[Ints, Ints]]
 
 
+@dataclass(frozen=True, eq=False)
+class _UnderTruth:
+    """What a model does under the truth, of N tasks.
+
+    Attributes:
+        feasible: (N,) whether it can do each.
+        phi: (F, C') probability that it violates each of its regions, of the feasible ones.
+        error: (F,) mean final-state error of sampled trajectories.
+        trajectories: as of `Measures`; none where there are no cells.
+    """
+
+    feasible: Bools
+    phi: Floats
+    error: Floats
+    trajectories: Mapping[int, tuple[Ints, Ints]]
+
+
 def measure_point(settings: Settings, point: PointInference) -> Measures:
-    """Let the tabular agent do the tasks under the truth, and measure it."""
-    model, inference = point.model.under(point.truth), point.inference
-    count = len(point.demonstrations)
+    """Let the model do the tasks under the truth, and measure it."""
+    inference, count = point.inference, len(point.demonstrations)
     feasible, phi = np.zeros(count, dtype=bool), np.zeros(inference.phi.shape)
-    trajectories, controls = {}, []
+    error, distance, floor, share = np.full((4, count), np.nan)
     if settings.rollouts == 0:
-        nothing = np.full(count, np.nan)
-        return Measures(feasible, phi, nothing, nothing, nothing, nothing, {})
+        return Measures(feasible, phi, error, distance, floor, share, {})
+    done = _under_truth(point.model, settings, point)
+    feasible = done.feasible
+    if feasible.any():
+        phi[feasible], error[feasible] = done.phi[:, point.hypotheses], done.error
+        violations = violation_distance(phi[feasible], inference.violated[feasible])
+        distance[feasible], floor[feasible] = violations.each, violations.floor
+        share[feasible] = violations.shares
+    return Measures(feasible, phi, error, distance, floor, share, done.trajectories)
+
+
+@singledispatch
+def _under_truth(model: Model, settings: Settings, point: PointInference) -> _UnderTruth:
+    """Let a model do a point's tasks under the truth."""
+    raise TypeError(f"a {type(model).__name__} is no model")
+
+
+@_under_truth.register
+def _of_cells(model: TabularModel, settings: Settings, point: PointInference) -> _UnderTruth:
+    model = model.under(point.truth)
+    feasible = np.zeros(len(point.demonstrations), dtype=bool)
+    phi, trajectories, controls, done = [], {}, [], []
     for j, demonstration in enumerate(point.demonstrations):
         distribution = TrajectoryDistribution.of_task(model, demonstration.task)
         if not distribution.is_possible:
             continue
         feasible[j] = True
-        phi[j] = distribution.violation_probabilities()[point.hypotheses]
+        phi.append(distribution.violation_probabilities())
         number = int(point.numbers[j])
         cells, moves = distribution.sample(
             settings.rollouts, stream(settings.seed, Purpose.ROLLOUTS, number)
         )
         trajectories[number] = cells[0], moves[0]
         controls.append(model.actions[model.action[moves]])
-    error, distance, floor, share = np.full((4, count), np.nan)
-    if feasible.any():
-        done = [point.demonstrations[j] for j in np.flatnonzero(feasible)]
-        error[feasible] = rollout_errors(
+        done.append(demonstration)
+    error = np.zeros(0)
+    if done:
+        error = rollout_errors(
             model.system, done, np.stack(controls), model.dt, settings.demonstrations.dt
         )
-        violations = violation_distance(phi[feasible], inference.violated[feasible])
-        distance[feasible], floor[feasible] = violations.each, violations.floor
-        share[feasible] = violations.shares
-    return Measures(feasible, phi, error, distance, floor, share, trajectories)
+    return _UnderTruth(feasible, np.array(phi), error, trajectories)
+
+
+@_under_truth.register
+def _of_samples(model: SampledModel, settings: Settings, point: PointInference) -> _UnderTruth:
+    feasible = np.zeros(len(point.demonstrations), dtype=bool)
+    phi, error = [], []
+    for j, demonstration in enumerate(point.demonstrations):
+        distribution = model.distribution(demonstration.task).under(point.truth)
+        if distribution.diagnosis.effective < _FEWEST_EFFECTIVE:
+            continue
+        feasible[j] = True
+        phi.append(distribution.violation_probabilities())
+        rng = stream(settings.seed, Purpose.ROLLOUTS, int(point.numbers[j]))
+        final = distribution.sample(settings.rollouts, rng)[:, -1]
+        goal = demonstration.task.goal
+        error.append(np.mean(final_state_error(model.system.space, final, goal)))
+    return _UnderTruth(feasible, np.array(phi), np.array(error), {})
 
 
 def rollout_errors(

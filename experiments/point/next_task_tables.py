@@ -144,16 +144,16 @@ def _own_pool(settings: Settings, point: PointInference) -> _Pool:
 
 def _model_pool(settings: Settings, point: PointInference) -> _Pool:
     """Demonstrations of the same tasks by the tabular agent under the truth, between cells."""
-    constrained, repetitions = point.model.under(point.truth), settings.next_task.repetitions
+    constrained, repetitions = point.tabular.under(point.truth), settings.next_task.repetitions
     tasks, crossed = [], []
     for number, demonstration in enumerate(point.demonstrations):
         under_truth = TrajectoryDistribution.of_task(constrained, demonstration.task)
         if under_truth.is_possible:
             rng = stream(settings.seed, Purpose.NEXT_TASK, _OF_MODEL, number)
             cells, moves = under_truth.sample(repetitions, rng)
-            crossed.append(point.model.crossed(cells[:, :-1], moves)[:, point.hypotheses])
+            crossed.append(point.tabular.crossed(cells[:, :-1], moves)[:, point.hypotheses])
             tasks.append(demonstration.task)
-    prepared = prepare(point.model, tasks, hypotheses=point.hypotheses, exact_ends=False)
+    prepared = prepare(point.tabular, tasks, hypotheses=point.hypotheses, exact_ends=False)
     shown = [
         Inference(
             prepared.hypotheses,
@@ -180,7 +180,7 @@ def _simulated(
 ) -> list[TaskOutcomes | None]:
     """What demonstrations of tasks may show."""
     return simulate_tasks(
-        point.model,
+        point.tabular,
         inference,
         tasks,
         hypotheses=point.hypotheses,

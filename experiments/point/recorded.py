@@ -10,6 +10,7 @@ from experiments.progress import begin
 from mlci.demonstrations import Demonstration
 from mlci.inference import Inference
 from mlci.maxent import ROUNDED_TIMES
+from mlci.models import Model
 from mlci.recordings.paths import Repair
 from mlci.recordings.plausibility import Plausibility, plausibility
 from mlci.recordings.read import Readings, read_demonstrations
@@ -82,12 +83,12 @@ def plausibilities(
 
 def recorded_weights(
     settings: RecordedSettings,
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     inference: Inference,
 ) -> list[WeightEstimate]:
     """Soft or hard? The weights of so many regions as the settings ask for."""
-    if not settings.soft:
+    if not settings.soft or not isinstance(model, TabularModel):
         return []
     begin("soft or hard?")
     return estimate_weights(

@@ -11,15 +11,15 @@ from experiments.config.settings import RecordedSettings
 from experiments.progress import begin
 from mlci.demonstrations import Demonstration, Task
 from mlci.inference import Inference
+from mlci.models import Model
 from mlci.next_task import NextTask, next_tasks
 from mlci.recordings.task_table import read_task_table
 from mlci.spaces import Box
-from mlci.tabular import TabularModel
 
 
 def recorded_next_tasks(
     settings: RecordedSettings,
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     inference: Inference,
 ) -> list[NextTask]:

@@ -9,6 +9,7 @@ import pandas as pd
 
 from mlci.demonstrations import Demonstration
 from mlci.inference import Inference
+from mlci.spaces import Bools, Floats
 
 
 def path_table(demonstrations: Sequence[Demonstration], names: Sequence[str]) -> pd.DataFrame:
@@ -40,6 +41,16 @@ def demonstration_tables(
                 "hypothesis": np.tile(np.arange(count), len(names)),
                 "probability": phi.ravel(),
                 "violated": inference.violated.ravel(),
+                **_error_columns(inference),
             }
         ),
     }
+
+
+def _error_columns(inference: Inference) -> dict[str, Floats | Bools]:
+    """Standard errors of sampled probabilities, and which are told from 0 and 1; else nothing."""
+    sampling = inference.sampling
+    if sampling is None:
+        return {}
+    resolved = ~sampling.unresolved(inference.avoidance)
+    return {"error": sampling.errors.ravel(), "resolved": resolved.ravel()}

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from experiments.belief_lines import area_lines, control_lines, set_lines
+from experiments.belief_lines import belief_lines
 from experiments.config.settings import Settings
 from experiments.console import (
     answer_lines,
@@ -15,11 +15,10 @@ from experiments.console import (
     measure_lines,
     trial_lines,
 )
-from experiments.point.area_shapes import area_belief, area_table
+from experiments.point.area_shapes import area_table
 from experiments.point.dynamics_tables import dynamics_table
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
-from experiments.point.streams import Purpose, stream
 from experiments.point.tables import point_tables
 from experiments.point.transfer_tables import transfer_tables
 from experiments.progress import begin
@@ -49,33 +48,22 @@ def run_point(
     begin("")
     for line in answer_lines(result, top, covered):
         log(line)
-    for line in set_lines(inferred.sets, inference.hypotheses.names):
-        log(line)
-    for line in control_lines(inferred.controls, top):
-        log(line)
-    area = area_belief(
-        settings,
-        inferred.model,
-        inferred.demonstrations,
-        inference,
-        stream(settings.seed, Purpose.AREAS, 3),
-    )
-    for line in area_lines(area):
+    for line in belief_lines(inferred.beliefs, top):
         log(line)
     if inferred.calibration is not None:
         for line in entry("calibration", inferred.calibration.summary()):
             log(line)
     for line in trial_lines(inferred.trials.counts()):
         log(line)
-    for line in diagnosis_lines(
-        inferred.diagnosis, space.names, inferred.unreachable, len(inferred.numbers)
-    ):
-        log(line)
+    if inferred.diagnosis is not None:
+        tasks = len(inferred.numbers)
+        for line in diagnosis_lines(inferred.diagnosis, space.names, inferred.unreachable, tasks):
+            log(line)
     begin("measuring")
     measures = measure_point(settings, inferred)
     tables = point_tables(settings, inferred, measures, result.misfit)
-    if area is not None:
-        tables["area"] = area_table(area)
+    if inferred.beliefs.area is not None:
+        tables["area"] = area_table(inferred.beliefs.area)
     if settings.transfer.strengths:
         begin("with stronger and weaker controls")
         tables |= transfer_tables(settings, inferred, store)

@@ -15,17 +15,17 @@ from mlci.demonstrations import Demonstration
 from mlci.evidence import Rates
 from mlci.inference import Inference
 from mlci.json_numbers import finite
+from mlci.models import Model
 from mlci.sets.inference import infer_sets
 from mlci.sets.posterior import SetPosterior, SetPrior
 from mlci.spaces import Bools
-from mlci.tabular import TabularModel
 
 MOST_ROWS = 1000  # of a table of sets
 
 
 def set_belief(
     settings: ModelSettings,
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     inference: Inference,
     rng: np.random.Generator,
@@ -37,7 +37,7 @@ def set_belief(
 
     Args:
         settings: say how large a set may be.
-        model: the tabular model.
+        model: the model.
         demonstrations: the N demonstrations.
         inference: what they say of each hypothesis.
         rng: for a sample.

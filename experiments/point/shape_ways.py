@@ -48,7 +48,7 @@ class ShapeWays:
             return None
         evidence = shape_evidence(
             settings,
-            point.model,
+            point.tabular,
             point.demonstrations,
             point.inference,
             stream(settings.seed, Purpose.AREAS, 1),

@@ -32,11 +32,11 @@ def soft_table(settings: Settings, point: PointInference) -> pd.DataFrame:
         `verdict`; mean `time_inside`, and `expected_time` without a constraint [s].
     """
     region = int(np.flatnonzero(point.truth)[0])
-    softened = soften(point.model, region)
+    softened = soften(point.tabular, region)
     possible = [
         each
         for each in (
-            TrajectoryDistribution.of_task(point.model, demonstration.task)
+            TrajectoryDistribution.of_task(point.tabular, demonstration.task)
             for demonstration in point.demonstrations
         )
         if each.is_possible

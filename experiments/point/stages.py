@@ -23,9 +23,11 @@ import mlci.tabular
 from experiments.config.settings import ModelSettings, Settings, ShapeList, SubjectSettings
 from experiments.tracking.store import Store, Stored
 from mlci.grids import Grid
+from mlci.models import Model
 from mlci.regions import Regions
 from mlci.safety.constant_controls import tabulate_escapes
 from mlci.safety.reachability import SafeSet, solve_safe_set
+from mlci.sampled.distribution import SampledModel
 from mlci.single_moves import SingleMoves
 from mlci.systems import System
 from mlci.tabular import TabularModel, discretize, moves_are_kept
@@ -65,6 +67,42 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
     modules = [source, system_module(settings.model), *shape_modules(settings, settings.constraint)]
     stored = store.get("safe_set", safe_set_inputs(settings), modules, compute)
     return SafeSet(grid, stored["values"], stored["gradients"]), stored.key
+
+
+def inference_model(settings: Settings, store: Store) -> Model:
+    """What tells how probable regions are; its regions are the hypotheses and then the truth's."""
+    if settings.sampling is None:
+        return tabular_model(settings, store)
+    return sampled_model(settings, settings.candidates.joined(settings.constraint))
+
+
+def formed_model(settings: ModelSettings, regions: Regions) -> Model:
+    """The same with some regions, formed anew."""
+    if settings.sampling is None:
+        return discretized_model(settings, regions)
+    return sampled_model(settings, regions)
+
+
+def sampled_model(settings: ModelSettings, regions: Regions) -> SampledModel:
+    """The model that samples paths, with some regions.
+
+    Raises:
+        ValueError: the settings ask for cells.
+    """
+    asked = settings.sampling
+    if asked is None:
+        raise ValueError("these settings ask for cells: sampled is null")
+    return SampledModel(
+        system=settings.model,
+        regions=regions,
+        dt=settings.dt,
+        temperature=settings.temperature,
+        samples=asked.samples,
+        substeps=asked.substeps,
+        restarts=asked.restarts,
+        tolerance=asked.tolerance,
+        limit=settings.action_box if asked.limited else None,
+    )
 
 
 def tabular_model(settings: Settings, store: Store) -> TabularModel:

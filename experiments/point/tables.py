@@ -14,6 +14,7 @@ from experiments.point.evidence_kinds import evidence_table
 from experiments.point.forecasts import forecast_table
 from experiments.point.inference import PointInference
 from experiments.point.measures import Measures
+from experiments.point.model_tables import model_tables
 from experiments.point.next_task_tables import next_task_table
 from experiments.point.ranking_tables import rank_table, ranking_table
 from experiments.point.sets import set_tables
@@ -27,9 +28,11 @@ from experiments.point.trajectory_tables import (
 from experiments.point.truth_tables import TRUTH_TABLES, truth_tables
 from experiments.tracking.files import csv_bytes
 from experiments.tracking.tables import rounded
+from mlci.diagnosis import Diagnosis
 from mlci.inference import Inference
 from mlci.misfit import Misfit
 from mlci.spaces import Floats
+from mlci.systems import System
 
 PAPER_SIZE = 9  # demonstrations after which the paper looks at the rank
 FIRST = 5  # demonstrations of the paper's Fig. 7
@@ -53,7 +56,8 @@ def point_tables(
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
         `dimensions` of the state, and `regions` of the truth. If asked for, `sets` and
         `set_marginals`; `calibration`, and `evidence` and `forecasts` where these are calibrated;
-        `baselines`, `next_task`, `soft`, `controls` and `control_ranks`, `areas` and `area_map`.
+        `baselines`, `next_task`, `soft`, `controls` and `control_ranks`, `areas` and `area_map`,
+        and those of `model_tables`.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -81,22 +85,24 @@ def point_tables(
     if settings.misfit:
         # About one in 50 of the model's own trajectories is.
         tables["trials"]["rare"] = np.where(inference.reachable, compared.is_rare, np.nan)
-    if point.sets is not None:
-        tables |= set_tables(point.sets)
+    if point.beliefs.sets is not None:
+        tables |= set_tables(point.beliefs.sets)
     if settings.calibration.sets:
         tables["calibration"] = belief_counts(settings, point)
         if point.calibration is not None and settings.inference.exact_ends:
             tables["evidence"] = evidence_table(settings, point, point.calibration)
             tables["forecasts"] = forecast_table(point.calibration)
+    if settings.models.trials:
+        tables |= model_tables(settings, point)
     if settings.baselines.paths:
         tables["baselines"] = baseline_table(settings, point)
     if settings.areas.subsets:
         tables |= area_tables(settings, point)
     if settings.next_task.repetitions:
         tables["next_task"] = next_task_table(settings, point)
-    if point.controls is not None:
+    if point.beliefs.controls is not None:
         rng = stream(settings.seed, Purpose.CONTROLS, 0)
-        tables |= control_tables(settings, point.controls, rng)
+        tables |= control_tables(settings, point.beliefs.controls, rng)
     if settings.soft.weights:
         tables["soft"] = soft_table(settings, point)
     return tables
@@ -154,17 +160,21 @@ def _summary_table(
         f"rank_after_{PAPER_SIZE}": after["rank"].median(),
         f"share_top_{top}_after_{PAPER_SIZE}": after[f"share_top_{top}"].mean(),
         **_rule_breaking(point.inference),
-        "stay": diagnosis.stay,
-        "leave": diagnosis.leave,
-        "cells_crossed": diagnosis.cells_crossed,
-        **{
-            f"frozen_{name}": share
-            for name, share in zip(settings.model.space.names, diagnosis.frozen, strict=True)
-        },
-        **{f"noise_{i + 1}": noise for i, noise in enumerate(diagnosis.noise)},
-        **{f"free_noise_{i + 1}": noise for i, noise in enumerate(diagnosis.free_noise)},
+        **_diagnosis_columns(settings.model, diagnosis),
     }
     return pd.DataFrame([row])
+
+
+def _diagnosis_columns(system: System, diagnosis: Diagnosis | None) -> dict[str, float]:
+    """How cells move; NaN where there are none."""
+    names, controls = system.space.names, range(1, system.control_box.dimension + 1)
+    columns = ["stay", "leave", "cells_crossed", *(f"frozen_{name}" for name in names)]
+    noises = ["noise", "free_noise"]
+    columns += [f"{noise}_{control}" for noise in noises for control in controls]
+    if diagnosis is None:
+        return dict.fromkeys(columns, np.nan)
+    values = [diagnosis.stay, diagnosis.leave, diagnosis.cells_crossed, *diagnosis.frozen]
+    return dict(zip(columns, [*values, *diagnosis.noise, *diagnosis.free_noise], strict=True))
 
 
 def _rule_breaking(inference: Inference) -> dict[str, float]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
+from mlci.models import Model
 from mlci.spaces import Bools, Floats, Ints
 from mlci.tabular import TabularModel
 
@@ -28,7 +29,7 @@ def trial_that_shows_the_constraint(feasible: Bools, unconstrained: Floats, cove
 
 
 def trajectory_tables(
-    model: TabularModel,
+    model: Model,
     hypotheses: Bools,
     trajectories: Mapping[int, tuple[Ints, Ints]],
     violated: Mapping[int, Bools],
@@ -37,7 +38,7 @@ def trajectory_tables(
     """Sampled trajectories, the hypotheses that they and the demonstrations violate, some moves.
 
     Args:
-        model: the tabular model.
+        model: the model; of one without cells there are no trajectories.
         hypotheses: (C',) mask over the model's regions.
         trajectories: cells (T+1,) and moves (T,) of one sampled trajectory, by trial.
         violated: (C,) hypotheses that a demonstration violates, by trial.
@@ -51,22 +52,29 @@ def trajectory_tables(
     visits, crossed = [], []
     for trial, (cells, _) in trajectories.items():
         visits += [(trial, step, cell) for step, cell in enumerate(cells)]
-    if trajectories:
+    if trajectories and isinstance(model, TabularModel):
         cells, moves = map(np.stack, zip(*trajectories.values(), strict=True))
         regions = model.crossed(cells[:, :-1], moves)[:, hypotheses]
         for trial, row in zip(trajectories, regions, strict=True):
             crossed += [(trial, "sampled", i) for i in np.flatnonzero(row)]
     for trial, regions in violated.items():
         crossed += [(trial, "demonstration", i) for i in np.flatnonzero(regions)]
-    visited = np.unique(() if example is None else trajectories[example][0]).astype(np.int64)
-    single = model.moves_of(visited)
-    row, move = np.nonzero(single.allowed(model.truth))
-    rows = np.stack([visited[row], model.action[move], single.successor[row, move]], axis=1)
+    rows = np.zeros((0, 3), dtype=np.int64)
+    if example is not None and example in trajectories and isinstance(model, TabularModel):
+        rows = _move_rows(model, np.unique(trajectories[example][0]).astype(np.int64))
     return {
         "sampled": pd.DataFrame(visits, columns=["trial", "step", "cell"]),
         "violations": pd.DataFrame(sorted(crossed), columns=["trial", "source", "hypothesis"]),
-        "moves": pd.DataFrame(np.unique(rows, axis=0), columns=["cell", "action", "successor"]),
+        "moves": pd.DataFrame(rows, columns=["cell", "action", "successor"]),
     }
+
+
+def _move_rows(model: TabularModel, visited: Ints) -> Ints:
+    """Cell, action and successor (R, 3) of the moves of some cells."""
+    single = model.moves_of(visited)
+    row, move = np.nonzero(single.allowed(model.truth))
+    rows = np.stack([visited[row], model.action[move], single.successor[row, move]], axis=1)
+    return np.unique(rows, axis=0)
 
 
 def probability_table(

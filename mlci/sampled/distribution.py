@@ -10,27 +10,29 @@ No cells: trajectories begin at the start and end in the goal region, a point's 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import scipy  # loads scipy.special when it is first used
+from numpy.typing import ArrayLike
 
 from mlci.demonstrations import REACHED, Task
-from mlci.regions import Regions
+from mlci.regions import Regions, as_mask
+from mlci.sampled import weights
 from mlci.sampled.adaptation import adapted_proposal
+from mlci.sampled.diagnosis import SamplingDiagnosis
 from mlci.sampled.modes import Modes, find_modes
 from mlci.sampled.passage import Passage
 from mlci.sampled.proposals import draw
-from mlci.sampled.weights import deviations, effective_count, pareto_shape
 from mlci.simulate import step_count
 from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.systems import System
 
 ROUNDED_TIMES = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
 _SEARCH, _DRAWS, _REPLICATES = range(3)  # a generator each, so that none depends on another
+_PILOT = 1000  # samples of a pilot at least, if there are so many of the task
 _PAIRS_AT_ONCE = 4_000_000  # of paths and regions
-_EFFECTIVE, _PARETO, _LATE = 100.0, 0.7, 0.02  # what a result needs to be believed
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,51 +107,6 @@ class SampledModel:
 
 
 @dataclass(frozen=True, eq=False)
-class SamplingDiagnosis:
-    """Whether samples can be believed.
-
-    Attributes:
-        samples: paths that were drawn.
-        reached: share of them that end in the goal and stay in the state space.
-        effective: paths of equal weight that would tell as much.
-        pareto_k: shape of the weights' tail, see `mlci.sampled.weights.pareto_shape`.
-        mode_probability: (M,) probability of the paths that are due to each mode.
-        late: probability of the modes that only the second half of the restarts led to; above 0 it
-            tells that more restarts may lead to more.
-        rounds: of refits.
-    """
-
-    samples: int
-    reached: float
-    effective: float
-    pareto_k: float
-    mode_probability: Floats
-    late: float
-    rounds: int
-
-    @property
-    def complaints(self) -> list[str]:
-        """Why the samples are not to be believed, a phrase each; empty if they are."""
-        found = []
-        if not self.effective >= _EFFECTIVE:
-            found.append(
-                f"{self.effective:.0f} effective samples, fewer than {_EFFECTIVE:.0f}: take more"
-            )
-        if not self.pareto_k <= _PARETO:
-            found.append(f"the weights' tail has k = {self.pareto_k:.2f}, above {_PARETO}")
-        if self.late > _LATE:
-            found.append(
-                f"the last restarts still add {self.late:.2f} of the probability: take more"
-            )
-        return found
-
-    @property
-    def trusted(self) -> bool:
-        """Whether there is nothing to complain of."""
-        return not self.complaints
-
-
-@dataclass(frozen=True, eq=False)
 class SampledDistribution:
     """Weighted paths of a task; made by `SampledModel.distribution`.
 
@@ -213,26 +170,28 @@ class SampledDistribution:
         alpha = self.avoidance_probabilities()
         moved = np.zeros((len(self.strata), len(alpha)))
         moved[self.reached] = self.weight[:, None] * (self.avoided - alpha)
-        return deviations(moved, self.strata)
+        return weights.deviations(moved, self.strata)
 
     def avoidance_errors(self) -> Floats:
         """(C,) standard errors of alpha.
 
         No less than one effective sample's share: what no sample shows may be so rare.
         """
-        squares = np.sum(np.square(self.influences()), axis=0)
-        return np.sqrt(squares + 1 / self.diagnosis.effective**2)
+        return np.hypot(weights.sum_error(self.influences()), 1 / self.diagnosis.effective)
 
     def avoidance_replicates(self, count: int) -> Floats:
-        """(count, C) alpha as other samples of the same number might give it.
+        """(count, C) alpha as other samples of the same number might give it; the same each time.
 
-        Regions that a path avoids together err together. The same task gives the same replicates.
+        Regions that a path avoids together err together, if they are neither all nor none.
         """
-        influences = self.influences()
         rng = np.random.default_rng([*self.key, _REPLICATES])
-        alpha = self.avoidance_probabilities()
-        moved = alpha + rng.standard_normal((count, len(influences))) @ influences
-        return np.clip(moved, 0.0, 1.0)
+        alpha, errors = self.avoidance_probabilities(), self.avoidance_errors()
+        return weights.replicates(alpha, errors, self.influences(), self.least, count, rng)
+
+    @property
+    def least(self) -> float:
+        """What stands for the probability of what no sample shows: half an effective sample."""
+        return 0.5 / self.diagnosis.effective
 
     def sample(self, count: int, rng: np.random.Generator) -> Floats:
         """Paths (count, K+1, n), drawn anew from the weighted ones.
@@ -240,8 +199,61 @@ class SampledDistribution:
         Raises:
             ValueError: no path reaches the goal.
         """
+        return np.asarray(self.paths[self._draw(count, rng)])
+
+    def crossings(self, count: int, rng: np.random.Generator) -> Bools:
+        """(count, C) which regions paths cross, drawn anew from the weighted ones.
+
+        Raises:
+            ValueError: no path reaches the goal.
+        """
+        return ~self.avoided[self._draw(count, rng)]
+
+    def log_avoidance_beside(self, members: Bools) -> Floats:
+        """(C,) log probability of avoiding a set, a mask (C,) of regions, together with each.
+
+        Raises:
+            ValueError: no path reaches the goal.
+        """
         self._require_possible()
-        return np.asarray(self.paths[rng.choice(len(self.weight), size=count, p=self.weight)])
+        free = np.all(self.avoided[:, members], axis=1)
+        with np.errstate(divide="ignore"):
+            return np.log(np.clip((self.weight * free) @ self.avoided, 0.0, 1.0))
+
+    def under(self, truth: ArrayLike) -> SampledDistribution:
+        """The distribution under constraints, equation (3): paths that cross the truth weigh 0.
+
+        Its diagnosis tells how few paths are left. Nothing is drawn anew.
+
+        Args:
+            truth: (C,) mask over the regions.
+        """
+        mask = as_mask(truth, len(self.regions))
+        kept = np.all(self.avoided[:, mask], axis=1)
+        alpha = float(np.sum(self.weight[kept]))
+        weight = self.weight[kept] / alpha if alpha > 0 else np.zeros(int(np.sum(kept)))
+        square = float(weight @ weight)
+        reached = np.zeros_like(self.reached)
+        reached[np.flatnonzero(self.reached)[kept]] = True
+        moved = np.zeros(len(reached))
+        moved[reached] = weight
+        error = float(weights.sum_error(weights.deviations(moved, self.strata)))
+        constrained = replace(
+            self,
+            paths=self.paths[kept],
+            weight=weight,
+            reached=reached,
+            log_z=self.log_z + (float(np.log(alpha)) if alpha > 0 else -np.inf),
+            log_z_error=error if alpha > 0 else np.inf,
+            diagnosis=replace(self.diagnosis, effective=1 / square if square > 0 else 0.0),
+        )
+        vars(constrained)["avoided"] = self.avoided[kept]
+        return constrained
+
+    def _draw(self, count: int, rng: np.random.Generator) -> Ints:
+        """(count,) numbers of paths, by their weights."""
+        self._require_possible()
+        return rng.choice(len(self.weight), size=count, p=self.weight)
 
     def _require_possible(self) -> None:
         """Raise where there is no distribution."""
@@ -264,7 +276,8 @@ def sample_passage(
         diagnosis = SamplingDiagnosis(0, 0.0, 0.0, np.inf, nothing, 0.0, 0)
         of_nothing = paths, *none, -np.inf, np.inf, diagnosis, key
         return SampledDistribution(passage, regions, modes, *of_nothing)
-    proposal, rounds = adapted_proposal(passage, modes, samples, max(1000, samples // 3), rng)
+    pilot = max(min(samples, _PILOT), samples // 3)
+    proposal, rounds = adapted_proposal(passage, modes, samples, pilot, rng)
     draws = draw(passage, proposal, rng)
     log_weight = np.where(draws.reached, draws.log_weight, -np.inf)
     count, reached = len(log_weight), draws.reached
@@ -274,13 +287,13 @@ def sample_passage(
     diagnosis = SamplingDiagnosis(
         samples=count,
         reached=float(np.mean(reached)),
-        effective=effective_count(log_weight),
-        pareto_k=pareto_shape(log_weight),
+        effective=weights.effective_count(log_weight),
+        pareto_k=weights.pareto_shape(log_weight),
         mode_probability=probability,
         late=float(probability @ modes.late),
         rounds=rounds,
     )
-    error = float(np.sqrt(np.sum(np.square(deviations(weight, draws.component)))))
+    error = float(weights.sum_error(weights.deviations(weight, draws.component)))
     return SampledDistribution(
         *(passage, regions, modes, draws.paths[reached], weight[reached], reached),
         *(draws.component, log_total - np.log(count), error, diagnosis, key),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mlci.sampling_errors import RESOLVED
 from mlci.spaces import Floats, Ints
 
 _SMALL = 10  # strata with fewer samples are taken together
@@ -62,3 +63,38 @@ def pareto_shape(log_weight: Floats) -> float:
     best = float(np.sum(theta * belief) / np.sum(belief))
     fitted = float(np.mean(np.log1p(-best * excess)))
     return (fitted * tail + 5.0) / (tail + 10)  # their weak prior towards 0.5
+
+
+def sum_error(influences: Floats) -> Floats:
+    """Standard errors (...,) of sums by how far each sample moves them (N, ...)."""
+    return np.asarray(np.sqrt(np.sum(np.square(influences), axis=0)))
+
+
+def replicates(
+    chance: Floats,
+    errors: Floats,
+    influences: Floats,
+    least: float,
+    count: int,
+    rng: np.random.Generator,
+) -> Floats:
+    """(count, C) probabilities as other samples might give them, in (0, 1].
+
+    They are normal about the estimates; those near to 0 or 1 follow a gamma distribution, which is
+    never negative, nor 0 for what no sample showed.
+
+    Args:
+        chance: (C,) estimates.
+        errors: (C,) their standard errors, above 0.
+        influences: (N, C) how far each sample moves them.
+        least: takes the place of an estimate of 0.
+        count: of replicates.
+        rng: draws them.
+    """
+    moved = chance + rng.standard_normal((count, len(influences))) @ influences
+    for is_small, near in ((True, chance), (False, 1 - chance)):
+        rare = near < RESOLVED * errors
+        mean, error = np.maximum(near, least)[rare], errors[rare]
+        drawn = rng.gamma(np.square(mean / error), np.square(error) / mean, (count, len(mean)))
+        moved[:, rare] = drawn if is_small else 1 - drawn
+    return np.asarray(np.clip(moved, np.finfo(float).tiny, 1.0))

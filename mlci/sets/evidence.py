@@ -20,10 +20,9 @@ from numpy.typing import ArrayLike
 from mlci.demonstrations import Demonstration
 from mlci.evidence import PAPER, Rates, log_evidence, total_gain
 from mlci.inference import Inference
-from mlci.maxent import TrajectoryDistribution
+from mlci.models import Distribution, Model, distribution_of
 from mlci.regions import as_mask
 from mlci.spaces import Bools, Floats
-from mlci.tabular import TabularModel
 
 # From a mask (C,) of regions, log alpha (C,) of avoiding all of them and each.
 Beside = Callable[[Bools], Floats]
@@ -64,7 +63,7 @@ class SetEvidence:
     @classmethod
     def of(
         cls,
-        model: TabularModel,
+        model: Model,
         demonstrations: Sequence[Demonstration],
         inference: Inference,
         *,
@@ -74,7 +73,7 @@ class SetEvidence:
         """That of sets of the regions that an inference is about, with its rates.
 
         Args:
-            model: the tabular model.
+            model: the model.
             demonstrations: the N that the inference is from.
             inference: what `infer` says of them, without a calibration.
             hypotheses: (C',) mask over the model's regions, as of `infer`.
@@ -94,9 +93,7 @@ class SetEvidence:
         if inference.calibration is not None:
             raise ValueError("a calibration says nothing of sets: infer without one")
         distributions = [
-            TrajectoryDistribution.of_task(
-                model, each.task, round_horizon=True, exact_ends=exact_ends
-            )
+            distribution_of(model, each.task, round_horizon=True, exact_ends=exact_ends)
             for each in demonstrations
         ]
         return cls(
@@ -156,7 +153,7 @@ class SetEvidence:
         return alpha
 
 
-def _beside(distribution: TrajectoryDistribution, hypotheses: Bools) -> Beside:
+def _beside(distribution: Distribution, hypotheses: Bools) -> Beside:
     """log alpha of sets of the hypotheses, a mask (C',) over the model's regions; remembered."""
 
     known: dict[bytes, Floats] = {}

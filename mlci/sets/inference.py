@@ -8,17 +8,17 @@ import numpy as np
 
 from mlci.demonstrations import Demonstration
 from mlci.inference import Inference
+from mlci.models import Model
 from mlci.sets.evidence import SetEvidence
 from mlci.sets.posterior import SetPosterior, SetPrior, can_enumerate, enumerate_sets
 from mlci.sets.sampling import sample_sets
 from mlci.spaces import Bools
-from mlci.tabular import TabularModel
 
 PAIRS = SetPrior()  # none, one region, or two
 
 
 def infer_sets(
-    model: TabularModel,
+    model: Model,
     demonstrations: Sequence[Demonstration],
     inference: Inference,
     prior: SetPrior = PAIRS,
@@ -35,7 +35,7 @@ def infer_sets(
     possible by prior and demonstrations, and is sampled otherwise.
 
     Args:
-        model: the tabular model.
+        model: the model.
         demonstrations: N demonstrations.
         inference: what `infer` says of them, with its rates and without a calibration.
         prior: of sets; by default of none, some one region, and some pair.

@@ -27,6 +27,7 @@ from paper_figures.report import (
     section_origin,
     section_readings,
     section_rule_breaking,
+    section_sampled,
     section_soft,
     section_start_points,
     section_transfer,
@@ -189,6 +190,11 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         "What to record next",
         section_chosen_tasks.section,
         (Figure("next_task", "chosen_tasks", "Who has not found the truth yet, task after task."),),
+    ),
+    (
+        "With and without a grid",
+        section_sampled.section,
+        (Figure("sampled", "sampled_models", "Sampled paths beside cells."),),
     ),
     (
         "In-cell sampling at 100 cells",

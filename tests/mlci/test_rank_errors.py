@@ -34,7 +34,9 @@ SWINGS = [swing(0.4, "first"), swing(-1.0, "second")]
 def inference_of(replicates: Floats) -> Inference:
     """Two demonstrations that violate nothing of three hypotheses."""
     regions = BANDS.select(np.arange(16) < 3)
-    sampling = SamplingErrors(np.std(replicates, axis=0), replicates, ((), ("too few",)))
+    complaints = (), ("too few",)
+    effective = np.array([500.0, 20.0])
+    sampling = SamplingErrors(np.std(replicates, axis=0), replicates, complaints, effective)
     nothing = np.zeros((2, 3), dtype=bool)
     return Inference(
         *(regions, ("a", "b"), np.mean(replicates, axis=0), nothing, np.ones(2, dtype=bool)),

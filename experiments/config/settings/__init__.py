@@ -25,6 +25,7 @@ from experiments.config.settings.parts import (
 from experiments.config.settings.point import ModelSettings, Settings, SubjectSettings
 from experiments.config.settings.reality import RealitySettings
 from experiments.config.settings.recorded import RecordedSettings
+from experiments.config.settings.sampling import ModelsSettings, SampledSettings
 from experiments.config.settings.shapes import (
     BallSettings,
     HalfSpaceSettings,
@@ -53,6 +54,7 @@ __all__ = [
     "HypothesesSettings",
     "InferenceSettings",
     "ModelSettings",
+    "ModelsSettings",
     "NextTaskSettings",
     "RankSettings",
     "RealitySettings",
@@ -60,6 +62,7 @@ __all__ = [
     "Region",
     "RunSettings",
     "SafetySettings",
+    "SampledSettings",
     "SetSettings",
     "Settings",
     "ShapeList",

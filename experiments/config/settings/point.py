@@ -40,6 +40,7 @@ from experiments.config.settings.parts import (
     TruthSettings,
 )
 from experiments.config.settings.reality import RealitySettings, read_reality
+from experiments.config.settings.sampling import ModelsSettings, SampledSettings
 from experiments.config.settings.shapes import ShapeList
 from experiments.config.settings.system import SystemSettings, read_system
 from mlci.control.effort import WithEffort
@@ -114,6 +115,19 @@ class ModelSettings(SubjectSettings):
         Positive, about("of the maximum entropy model: larger is closer to random")
     ]
     inference: InferenceSettings
+    sampled: SampledSettings
+
+    @property
+    def sampling(self) -> SampledSettings | None:
+        """How paths are sampled; None where there are cells."""
+        return self.sampled if self.sampled.use else None
+
+    @property
+    def action_box(self) -> Box:
+        """The range of the controls: that of the actions, or the control box."""
+        if self.action_range is None:
+            return self.model.control_box
+        return Box(*np.array(self.action_range).T)
 
     @cached_property
     def cells(self) -> Grid:
@@ -139,6 +153,7 @@ class Settings(ModelSettings):
     soft: SoftSettings
     transfer: TransferSettings
     dynamics: DynamicsSettings
+    models: ModelsSettings
     rollouts: Annotated[
         CountOrNone,
         about(
@@ -195,8 +210,11 @@ class Settings(ModelSettings):
 
     @property
     def columns(self) -> dict[str, str | int | float]:
-        """The values that open every row of this point's tables."""
+        """The values that open every row of this point's tables; 0 for cells that are not."""
         actions = self.actions
+        if self.sampled.use:
+            kind = {"cells": 0, "actions": 0, "dt": self.dt, "samples": 0}
+            return {"truth": self.truth.label, **kind, "seed": self.seed}
         return {
             "truth": self.truth.label,
             "cells": math.prod(self.grid.shape),

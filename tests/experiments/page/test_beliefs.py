@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from page_answers import CIRCLE, answer_of
 
+from experiments.belief_lines import Beliefs
 from experiments.page.beliefs import belief_sentences
 from experiments.page.document import page
 from mlci.actuation.inference import ControlInference
@@ -34,7 +35,7 @@ def controls(avoidance: list[float], applied: list[bool]) -> ControlInference:
 
 def test_sets_are_told_as_their_most_probable_one_and_their_regions() -> None:
     none, one, two = (
-        belief_sentences(sets(each), NAMES, None)
+        belief_sentences(Beliefs(NAMES, sets(each), None, None))
         for each in ([0.5, 0.3, 0.2], [0.2, 0.5, 0.3], [0.2, 0.3, 0.5])
     )
     assert none[0].endswith("the likeliest answer is that nothing is avoided: 50.0 of 100.")
@@ -42,24 +43,25 @@ def test_sets_are_told_as_their_most_probable_one_and_their_regions() -> None:
     assert two[0].endswith("the likeliest answer is regions a, c together: 50.0 of 100.")
     assert one[1].endswith("region a: 80.0 of 100; region c: 30.0 of 100; region b: 0 of 100.")
     assert len(one) == 2
-    assert belief_sentences(None, NAMES, None) == []
+    assert belief_sentences(Beliefs(NAMES, None, None, None)) == []
 
 
 def test_sampled_sets_say_whether_their_chains_agree() -> None:
     for r_hat, word in ((1.0, "which agree"), (3.0, "which DISAGREE")):
         check = ChainCheck(np.full(4, r_hat), np.full(4, 1000.0), np.full(4, 0.01), 0.5)
-        assert word in belief_sentences(sets([0.5, 0.3, 0.2], check), NAMES, None)[-1]
+        found = sets([0.5, 0.3, 0.2], check)
+        assert word in belief_sentences(Beliefs(NAMES, found, None, None))[-1]
 
 
 def test_controls_are_told_with_what_is_assumed() -> None:
     # Likelihoods 5 and 1.25 at a prior of 0.25 each, against 1 at 0.5.
-    likely = belief_sentences(None, NAMES, controls([0.2, 0.8], [False, False]))
+    likely = belief_sentences(Beliefs(NAMES, None, controls([0.2, 0.8], [False, False]), None))
     assert likely[0] == (
         "Controls that are not applied, the likeliest first: control 0 above 1: 60.6 of 100; "
         "control 0 above 2: 15.2 of 100. That all are in use: 24.2 of 100."
     )
     assert "at most one range is forbidden, and no region" in likely[1]
-    applied = belief_sentences(None, NAMES, controls([0.2, 0.8], [True, True]))
+    applied = belief_sentences(Beliefs(NAMES, None, controls([0.2, 0.8], [True, True]), None))
     assert applied[0].startswith("Controls: no range stands out")
     assert applied[0].endswith("How likely that is: 100 of 100.")
 

@@ -76,8 +76,10 @@ def test_tables_of_a_point(tmp_path: Path) -> None:
 
 def test_wrong_answers_where_nothing_is_forbidden(tmp_path: Path) -> None:
     point = infer_point(settings_of("truth=none"), Store(tmp_path))
-    assert point.controls is not None
-    never = dataclasses.replace(point.controls, applied=np.zeros_like(point.controls.applied))
+    assert point.beliefs.controls is not None
+    never = dataclasses.replace(
+        point.beliefs.controls, applied=np.zeros_like(point.beliefs.controls.applied)
+    )
     settings, rng = settings_of("truth=none"), np.random.default_rng(0)
     ranks = controls.control_tables(settings, never, rng)["control_ranks"]
     assert ranks.loc[ranks["demonstrations"] == 2, "wrong"].eq(1).all()
@@ -92,11 +94,11 @@ def test_wrong_answers_where_nothing_is_forbidden(tmp_path: Path) -> None:
 
 def test_chances_are_calibrated_by_demonstrators_whom_nothing_limits(tmp_path: Path) -> None:
     store, settings = Store(tmp_path), settings_of(*WEAK, "inference.calibrate=true")
-    inferred = infer_point(settings, store).controls
+    inferred = infer_point(settings, store).beliefs.controls
     assert inferred is not None
     assert inferred.calibration is not None
     other = settings_of("truth=none", "inference.calibrate=true")
-    assert infer_point(other, store).controls.calibration == inferred.calibration  # stored
+    assert infer_point(other, store).beliefs.controls.calibration == inferred.calibration  # stored
     tables = controls.control_tables(settings, inferred, np.random.default_rng(0))
     plain, mapped = (part for _, part in tables["control_ranks"].groupby("calibrated"))
     assert mapped["none"].mean() > plain["none"].mean()  # so coarse a model says too much

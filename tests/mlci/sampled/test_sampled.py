@@ -7,6 +7,7 @@ from linear_bridge import WIDE, random_bridge
 from mlci.demonstrations import Task
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
+from mlci.models import forecast_of
 from mlci.regions import Regions
 from mlci.sampled.distribution import SampledModel, SamplingDiagnosis
 from mlci.spaces import Box, Floats
@@ -174,3 +175,32 @@ def test_a_model_and_tasks_that_cannot_be_are_refused():
 def test_what_needs_cells_says_so_of_a_model_without_them():
     with pytest.raises(TypeError, match="needs a TabularModel; a SampledModel has no cells"):
         TrajectoryDistribution.of_task(MODEL, TASK)
+
+
+def test_sets_truths_and_crossings_are_those_of_the_weighted_paths():
+    distribution = MODEL.distribution(TASK)
+    entered, weight = CELLS.violated_by(distribution.paths), distribution.weight
+    phi = distribution.violation_probabilities()
+    some = np.argsort(np.abs(phi - 0.4))[:2]
+    members = np.isin(np.arange(100), some)
+    free = ~entered[:, some].any(axis=1)
+    beside = [np.sum(weight[free & ~entered[:, i]]) for i in range(100)]
+    np.testing.assert_allclose(np.exp(distribution.log_avoidance_beside(members)), beside)
+    under = distribution.under(members)
+    np.testing.assert_allclose(under.log_z - distribution.log_z, np.log(np.sum(weight[free])))
+    expected = weight[free] @ entered[free] / np.sum(weight[free])
+    np.testing.assert_allclose(under.violation_probabilities(), expected, atol=1e-12)
+    assert under.diagnosis.effective < distribution.diagnosis.effective
+    drawn = np.mean(distribution.crossings(4000, np.random.default_rng(0)), axis=0)
+    assert np.max(np.abs(drawn - phi)) < 0.04  # five standard errors of 4000 draws
+    assert not distribution.under(np.ones(100, dtype=bool)).is_possible
+
+
+def test_nothing_is_unavoidable_only_because_no_sample_avoids_it():
+    distribution = MODEL.distribution(replace(TASK, start=np.array([0.5, 0.3])))
+    forecast = forecast_of(distribution, 50)
+    never = distribution.avoidance_probabilities() == 0
+    assert never.any()  # the start's own region
+    np.testing.assert_allclose(forecast.avoidance[never], 0.5 / distribution.diagnosis.effective)
+    assert np.all(forecast.sampling.replicates > 0)
+    assert forecast.sampling.unresolved(forecast.avoidance[None])[0, never].all()

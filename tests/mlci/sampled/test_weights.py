@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mlci.sampled.weights import deviations, effective_count, pareto_shape
+from mlci.sampled.weights import deviations, effective_count, pareto_shape, replicates
 
 
 def test_effective_samples_of_weights():
@@ -38,3 +38,17 @@ def test_too_few_weights_tell_no_shape_and_equal_ones_have_no_tail():
     assert pareto_shape(np.append(np.zeros(10), np.full(90, -np.inf))) == np.inf
     assert pareto_shape(np.zeros(8)) == np.inf
     assert pareto_shape(np.zeros(1000)) == -np.inf
+
+
+def test_replicates_of_what_is_rare_have_its_mean_and_error_and_are_never_none():
+    rng = np.random.default_rng(0)
+    chance, errors = np.array([0.0, 0.004, 0.5, 1.0]), np.array([0.002, 0.004, 0.1, 0.002])
+    influences = np.zeros((50, 4))
+    influences[:, 2] = 0.1 / np.sqrt(50)
+    drawn = replicates(chance, errors, influences, 0.001, 20_000, rng)
+    assert np.all(drawn > 0)
+    assert np.all(drawn <= 1)
+    # Of 20000 draws a mean is known to 1 % of the error, as good as 0.05 of it here.
+    expected = np.array([0.001, 0.004, 0.5, 0.999])
+    np.testing.assert_array_less(np.abs(np.mean(drawn, axis=0) - expected), 0.05 * errors)
+    np.testing.assert_allclose(np.std(drawn, axis=0), errors, rtol=0.1)
