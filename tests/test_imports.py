@@ -19,6 +19,7 @@ PACKAGES = ("mlci", "experiments", "paper_figures")
 MLCI = {
     "mlci.actuation": "",
     "mlci.control": "",
+    "mlci.mechanics": "",
     "mlci.safety": "",
     "mlci.sampled": "",
     "mlci.sets": "",
@@ -54,6 +55,10 @@ MLCI = {
     "mlci.simulate",
     "mlci.control.control_problem": "mlci.simulate",
     "mlci.safety.safety_filter": "mlci.control.control_problem mlci.safety.reachability",
+    "mlci.mechanics.rigid_chain": "mlci.spaces",
+    "mlci.mechanics.planar_chain": "mlci.mechanics.rigid_chain mlci.systems",
+    "mlci.safety.joint_barrier": "mlci.control.control_problem mlci.mechanics.planar_chain "
+    "mlci.regions",
     "mlci.control.riccati": "mlci.compiled mlci.control.control_problem",
     "mlci.control.ilqr": "mlci.control.riccati",
     "mlci.demonstrations": "mlci.spaces",

@@ -88,9 +88,14 @@ class PlanarChain(System):
     @cached_property
     def body(self) -> RigidChain:
         """The links without their joints' limits."""
-        rotors = self.rotors or (0.0,) * self.links
-        arrays = (self.lengths, self.masses, self.centers, self.inertias, rotors)
-        return RigidChain(*(np.array(each, dtype=float) for each in arrays), self.gravity)
+        return RigidChain(
+            np.array(self.lengths, dtype=float),
+            np.array(self.masses, dtype=float),
+            np.array(self.centers, dtype=float),
+            np.array(self.inertias, dtype=float),
+            np.array(self.rotors or (0.0,) * self.links, dtype=float),
+            self.gravity,
+        )
 
     @property
     def links(self) -> int:

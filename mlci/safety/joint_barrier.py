@@ -70,7 +70,9 @@ class JointBarrier(ControlFilter):
             raise ValueError("a barrier keeps out of boxes of joint angles at any rates alone")
         if not np.all(np.any(bounded, axis=1)):
             raise ValueError("a barrier cannot keep out of a region that bounds no joint")
-        if wraps := [space.names[d] for d in np.flatnonzero(np.any(bounded, axis=0) & space.periodic)]:
+        if wraps := [
+            space.names[d] for d in np.flatnonzero(np.any(bounded, axis=0) & space.periodic)
+        ]:
             raise ValueError(f"a barrier knows no side of joints that wrap: {', '.join(wraps)}")
 
     def value(self, states: Floats) -> Floats:
@@ -129,7 +131,7 @@ class JointBarrier(ControlFilter):
 
     def _rooms(self, states: Floats) -> Floats:
         """What each joint and side (..., C, 2 L) has of room; -inf where K has no such side."""
-        borders, known, braking = self._sides
+        _, known, braking = self._sides
         away, rate = self._from_borders(states)
         room = away - np.square(np.minimum(rate, 0.0)) / (2 * braking)
         return np.where(known, room, -np.inf)
@@ -144,7 +146,7 @@ class JointBarrier(ControlFilter):
             return sign * (angles - borders), sign * rates
 
     def _active(self, states: Floats, ahead: Floats) -> list[tuple[int, tuple[Ints, ...], Ints]]:
-        """Boxes that states ahead are too near, where (indices), and the best joint's side there."""
+        """Boxes that states ahead are too near to, at which states, and the best joint's side."""
         rooms, found = self._rooms(ahead), []
         near = ~(np.max(rooms, axis=-1) >= self.margin)
         for box in np.flatnonzero(np.any(near, axis=tuple(range(near.ndim - 1)))).tolist():
@@ -159,7 +161,9 @@ class JointBarrier(ControlFilter):
             np.take_along_axis(each, guard[..., None], axis=-1)[..., 0]
             for each in self._side_of(states, box)
         )
-        least = -np.sqrt(2 * self._sides[2][guard] * np.maximum(away + self.dt * rate - self.margin, 0.0))
+        least = -np.sqrt(
+            2 * self._sides[2][guard] * np.maximum(away + self.dt * rate - self.margin, 0.0)
+        )
         joint, sign = guard % links, np.where(guard < links, -1.0, 1.0)
         bending = chain.dynamics(states, controls)[..., links:]
         now = sign * np.take_along_axis(bending, joint[..., None], axis=-1)[..., 0]
