@@ -43,6 +43,7 @@ from mlci.spaces import Bools, Box
 
 BRAKING = 8.0  # [rad/s^2] that the demonstrator trusts each joint to
 MARGIN = 0.02  # [rad] that it stays away from the truth
+HORIZON = 1.0  # [s]
 DT = 0.025  # [s] of the demonstrator
 WEIGHT = 300.0  # price of the squared distance from the goal, as in conf/config.yaml
 
@@ -103,7 +104,7 @@ class Arm:
             Box(tasks["lower"], tasks["upper"]),
             trials=count,
             seed=seed,
-            horizon=self.config["horizon"],
+            horizon=HORIZON,
             dt=dt,
             goal_offsets=Box(-half, half),
             restarts=1,
