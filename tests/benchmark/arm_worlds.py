@@ -90,7 +90,7 @@ class Arm:
 
     @cached_property
     def model(self) -> SampledModel:
-        """What infers: one Runge-Kutta step a hold, exact to 1e-3 rad at these speeds."""
+        """What infers: one Runge-Kutta step a hold, off by about 0.01 rad in a second of noise."""
         dt = self.config["dt"]
         return SampledModel(self.system, self.hypotheses, dt, samples=self.samples, substeps=1)
 
