@@ -42,10 +42,12 @@ from mlci.forecasts import ForecastMap
 from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.maxent import TrajectoryDistribution
+from mlci.mechanics.planar_chain import PlanarChain
 from mlci.next_task import NextTask, next_tasks
 from mlci.preparation import PreparedInference, infer, prepare
 from mlci.rank_errors import RankErrors, infer_until_settled, rank_errors
 from mlci.regions import Regions
+from mlci.safety.joint_barrier import JointBarrier
 from mlci.safety.reachability import SafeSet, solve_safe_set
 from mlci.safety.safety_filter import SafetyFilter
 from mlci.sampled.distribution import SampledDistribution, SampledModel
@@ -101,8 +103,10 @@ __all__ = [
     "HalfSpace",
     "InTaskSpace",
     "Inference",
+    "JointBarrier",
     "NextTask",
     "Pendulum",
+    "PlanarChain",
     "Predicate",
     "PreparedInference",
     "RankErrors",

@@ -20,6 +20,7 @@ MLCI = {
     "mlci.actuation": "",
     "mlci.areas": "",
     "mlci.control": "",
+    "mlci.mechanics": "",
     "mlci.safety": "",
     "mlci.sampled": "",
     "mlci.sets": "",
@@ -55,6 +56,10 @@ MLCI = {
     "mlci.simulate",
     "mlci.control.control_problem": "mlci.simulate",
     "mlci.safety.safety_filter": "mlci.control.control_problem mlci.safety.reachability",
+    "mlci.mechanics.rigid_chain": "mlci.spaces",
+    "mlci.mechanics.planar_chain": "mlci.mechanics.rigid_chain mlci.systems",
+    "mlci.safety.joint_barrier": "mlci.control.control_problem mlci.mechanics.planar_chain "
+    "mlci.regions",
     "mlci.control.riccati": "mlci.compiled mlci.control.control_problem",
     "mlci.control.ilqr": "mlci.control.riccati",
     "mlci.demonstrations": "mlci.spaces",
