@@ -222,7 +222,7 @@ def answer(
             samples=samples,
         ),
         unseen=unseen(inference),
-        cut=cut_by(model.grid, inference.hypotheses),
+        cut=cut_by(model.equal_cells, inference.hypotheses),
         temperature=model.temperature,
         exact_ends=exact_ends,
         temperature_estimate=temperature,
