@@ -33,6 +33,8 @@ from mlci.actuation.inference import ControlInference, calibrate_controls, infer
 from mlci.actuation.predicates import ControlPredicates
 from mlci.actuation.ranges import ControlRanges
 from mlci.calibration import Calibration, calibrate
+from mlci.cells.multilinear import MultilinearModel
+from mlci.cells.refinement import refine
 from mlci.crossings import Crossing
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
@@ -101,6 +103,7 @@ __all__ = [
     "HalfSpace",
     "InTaskSpace",
     "Inference",
+    "MultilinearModel",
     "NextTask",
     "Pendulum",
     "Predicate",
@@ -146,6 +149,7 @@ __all__ = [
     "prepare",
     "rank_errors",
     "read_demonstrations",
+    "refine",
     "rollout",
     "sample_sets",
     "sample_trials",

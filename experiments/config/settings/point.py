@@ -40,6 +40,7 @@ from experiments.config.settings.parts import (
     TruthSettings,
 )
 from experiments.config.settings.reality import RealitySettings, read_reality
+from experiments.config.settings.resolution import ResolutionSettings
 from experiments.config.settings.shapes import ShapeList
 from experiments.config.settings.system import SystemSettings, read_system
 from mlci.control.effort import WithEffort
@@ -139,6 +140,7 @@ class Settings(ModelSettings):
     soft: SoftSettings
     transfer: TransferSettings
     dynamics: DynamicsSettings
+    resolution: ResolutionSettings
     rollouts: Annotated[
         CountOrNone,
         about(
