@@ -34,6 +34,7 @@ from mlci.actuation.predicates import ControlPredicates
 from mlci.actuation.ranges import ControlRanges
 from mlci.calibration import Calibration, calibrate
 from mlci.cells.multilinear import MultilinearModel
+from mlci.cells.refined_model import RefinedModel
 from mlci.cells.refinement import refine
 from mlci.crossings import Crossing
 from mlci.demonstrations import Demonstration, Task
@@ -109,6 +110,7 @@ __all__ = [
     "Predicate",
     "PreparedInference",
     "RankErrors",
+    "RefinedModel",
     "Regions",
     "SafeSet",
     "SafetyFilter",

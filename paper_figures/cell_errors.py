@@ -24,6 +24,7 @@ KINDS = {
     "multilinear": ("equal, multilinear", "#cc79a7", "D"),
     "round goals": ("equal, goals in the middle", "#009e73", "v"),
     "varying": ("varying", "#d55e00", "^"),
+    "of each task": ("varying, for each task alone", "#000000", "*"),
 }
 PANELS = {"error": "against sampled paths", "error_of_cells": "against 40 000 cells"}
 _REPLICATES = 1000  # of tasks, for intervals

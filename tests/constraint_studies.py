@@ -58,6 +58,7 @@ def control_tables() -> dict[str, pd.DataFrame]:
 def resolution_tables() -> dict[str, pd.DataFrame]:
     """Errors that fall with the number of cells: to the power of 0.5, and of 1 where they vary."""
     kinds = {"centre": 0.5, "averaged": 0.5, "multilinear": 0.5, "round goals": 0.5, "varying": 1.0}
+    kinds["of each task"] = 1.0
     rows = [
         {
             "seed": seed,

@@ -102,6 +102,7 @@ MLCI = {
     "mlci.cells.multilinear": "mlci.tabular",
     "mlci.cells.importance": "mlci.cells.box_tree mlci.maxent",
     "mlci.cells.refinement": "mlci.cells.goal_cells mlci.cells.importance",
+    "mlci.cells.refined_model": "mlci.cells.refinement",
     "mlci.displacements": "mlci.tabular",
     "mlci.exploration": "mlci.displacements mlci.maxent",
     "mlci.evidence": "mlci.spaces",
@@ -122,7 +123,8 @@ MLCI = {
     "mlci.sampled.proposals": "mlci.sampled.local_policies",
     "mlci.sampled.adaptation": "mlci.sampled.proposals mlci.sampled.weights",
     "mlci.sampled.distribution": "mlci.sampled.adaptation",
-    "mlci.models": "mlci.evidence mlci.maxent mlci.sampled.distribution mlci.sampling_errors",
+    "mlci.models": "mlci.cells.refined_model mlci.evidence mlci.maxent "
+    "mlci.sampled.distribution mlci.sampling_errors",
     "mlci.preparation": "mlci.inference mlci.models",
     "mlci.rank_errors": "mlci.preparation",
     "mlci.similar_tasks": "mlci.demonstrator mlci.tabular",

@@ -12,6 +12,7 @@ from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
 from mlci.cells.goal_cells import goal_tree
 from mlci.cells.multilinear import MultilinearModel
+from mlci.cells.refined_model import RefinedModel
 from mlci.cells.refinement import refine
 from mlci.demonstrations import Task
 from mlci.grids import Grid
@@ -22,7 +23,9 @@ from mlci.tabular import TabularModel
 
 COLUMNS = ["kind", "count", "task", "possible", "error", "noise", "trusted", "error_of_cells"]
 CENTRE, AVERAGED, MULTILINEAR = "centre", "averaged", "multilinear"
-ROUND_GOALS, VARYING = "round goals", "varying"
+ROUND_GOALS, VARYING, OF_TASK = "round goals", "varying", "of each task"
+Cells = TabularModel | RefinedModel
+
 _POINTS = 2  # start points along each dimension of a cell, where there are several
 _TOLERANCE = 0.02  # of the goal, where paths are sampled: a fifth of a cell, to be near a point
 
@@ -33,7 +36,8 @@ def resolution_table(settings: Settings, point: PointInference) -> pd.DataFrame:
     Returns:
         `kind`: `centre`, `averaged` and `multilinear` moves of equal cells; `round goals`, averaged
         moves of cells that are equal but for those of the goals; `varying`, averaged moves of cells
-        that are refined for all the tasks; `count` of cells; `task`; whether it is `possible`; over
+        that are refined for all the tasks; `of each task`, likewise, but for each task
+        alone; `count` of cells; `task`; whether it is `possible`; over
         the hypotheses the root mean square `error` of Phi against paths sampled without cells,
         whose own standard error is the `noise`, and whether they can be `trusted`; and likewise
         `error_of_cells`, against very many equal cells with the same actions. Where a task is not
@@ -70,25 +74,26 @@ def resolution_table(settings: Settings, point: PointInference) -> pd.DataFrame:
         regions,
         temperature=settings.temperature,
     )
-    limit, _ = _phi(replace(base, grid=_scaled(settings.cells, asked.finest)), tasks)
+    finest = replace(base, grid=_scaled(settings.cells, asked.finest))
+    limit = [_phi(way) for way in _ways(finest, tasks)]
     rows = []
     for count in asked.counts:
         for kind, make in _KINDS.items():
             model = make(base, tasks, count)
             if model is None:
                 continue
-            phi, possible = _phi(model, tasks)
-            for number in range(len(tasks)):
+            for number, way in enumerate(_ways(model, tasks)):
+                phi = _phi(way)
                 rows.append(
                     {
                         "kind": kind,
-                        "count": model.states,
+                        "count": way.model.states,
                         "task": number,
-                        "possible": possible[number],
-                        "error": _root_mean_square(phi[number] - reference[number]),
+                        "possible": way.is_possible,
+                        "error": _root_mean_square(phi - reference[number]),
                         "noise": noise[number],
                         "trusted": distributions[number].diagnosis.trusted,
-                        "error_of_cells": _root_mean_square(phi[number] - limit[number]),
+                        "error_of_cells": _root_mean_square(phi - limit[number]),
                     }
                 )
     return pd.DataFrame(rows, columns=COLUMNS)
@@ -100,19 +105,25 @@ def _scaled(grid: Grid, count: int) -> Grid:
     return Grid(grid.space, tuple(max(1, round(factor * each)) for each in grid.shape))
 
 
-def _phi(model: TabularModel, tasks: Sequence[Task]) -> tuple[Floats, list[bool]]:
-    """Phi (N, C) of tasks, 0 where one is not possible, and whether each is possible."""
-    ways = [TrajectoryDistribution.of_task(model, task, exact_ends=True) for task in tasks]
-    nothing = np.zeros(len(model.regions))
-    phi = [way.violation_probabilities() if way.is_possible else nothing for way in ways]
-    return np.array(phi), [way.is_possible for way in ways]
+def _ways(model: Cells, tasks: Sequence[Task]) -> list[TrajectoryDistribution]:
+    """The distributions of tasks."""
+    if isinstance(model, RefinedModel):
+        return [model.distribution(task) for task in tasks]
+    return [TrajectoryDistribution.of_task(model, task, exact_ends=True) for task in tasks]
+
+
+def _phi(way: TrajectoryDistribution) -> Floats:
+    """Phi (C,), 0 where the task is not possible."""
+    if not way.is_possible:
+        return np.zeros(len(way.model.regions))
+    return way.violation_probabilities()
 
 
 def _root_mean_square(values: Floats) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-Make = Callable[[TabularModel, Sequence[Task], int], TabularModel | None]
+Make = Callable[[TabularModel, Sequence[Task], int], Cells | None]
 
 
 def _centre(base: TabularModel, _tasks: Sequence[Task], count: int) -> TabularModel:
@@ -145,10 +156,17 @@ def _varying(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularMo
     return refine(replace(base, samples=_POINTS), tasks, count) if count >= base.states else None
 
 
+def _of_task(base: TabularModel, _tasks: Sequence[Task], count: int) -> RefinedModel | None:
+    """None likewise."""
+    averaged = replace(base, samples=_POINTS)
+    return RefinedModel(averaged, count) if count >= base.states else None
+
+
 _KINDS: dict[str, Make] = {
     CENTRE: _centre,
     AVERAGED: _averaged,
     MULTILINEAR: _multilinear,
     ROUND_GOALS: _round_goals,
     VARYING: _varying,
+    OF_TASK: _of_task,
 }

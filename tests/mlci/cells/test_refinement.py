@@ -114,6 +114,21 @@ def test_cells_that_are_not_visited_do_not_matter() -> None:
     assert 0.2 < np.mean(visited) < 0.95
 
 
+def test_inference_on_cells_of_each_task() -> None:
+    own = mlci.RefinedModel(model(), 150)
+    prepared = mlci.prepare(own, TASKS)
+    for task, avoidance in zip(TASKS, prepared.avoidance, strict=True):
+        alone = refine(model(), [task], 150)
+        way = TrajectoryDistribution.of_task(alone, task, exact_ends=True)
+        assert avoidance == pytest.approx(way.avoidance_probabilities(), abs=1e-12)
+    assert prepared.reachable.all()
+    with pytest.raises(ValueError, match="there are 100 cells already"):
+        mlci.RefinedModel(model(), 50)
+    outside = mlci.Task(np.array([1.0, 9.0]), TASKS[0].goal, 3.0)
+    with pytest.raises(ValueError, match="outside the state space"):
+        mlci.prepare(own, [outside])
+
+
 def test_what_cannot_be_refined_is_refused() -> None:
     with pytest.raises(ValueError, match="there is none"):
         refine(model(), [], 250)

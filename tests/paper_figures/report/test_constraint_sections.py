@@ -68,9 +68,9 @@ def test_what_is_let_in_and_what_is_refused(tmp_path: Path) -> None:
 def test_how_errors_fall_with_cells(tmp_path: Path) -> None:
     text = section_cells.section(results(tmp_path, "cells", resolution_tables()))
     # Of the two tasks that are trusted the errors are 1 and 2 times 0.1 (100 / count)^power.
-    assert "- against sampled paths: 400 varying cells err by 0.0395 [" in text
-    assert "1600 equal cells, from centres, by 0.0395 [" in text
-    assert text.count("is met") == 2
+    assert "- against sampled paths: 400 cells, varying, err by 0.0395 [" in text
+    assert "1600 cells, equal, averaged, by 0.0395 [" in text
+    assert text.count("is met") == 4
     line = next(line for line in text.splitlines() if line.startswith("| equal, from centres"))
     assert "100: 0.158 [" in line
     assert "4 of 4 tasks not possible" in line
