@@ -34,7 +34,7 @@ def error_rows(resolution: pd.DataFrame) -> pd.DataFrame:
     """A row a reference, kind of cells and number of them that was asked for.
 
     Numbers that are asked for lead to slightly different ones where cells are split round goals;
-    they are taken together by their order within a kind and seed.
+    they are taken together by their order within a kind, seed and task.
 
     Returns:
         `reference`, a column of PANELS; `kind`; mean `count`; `tasks`, and how many of them the
@@ -42,7 +42,7 @@ def error_rows(resolution: pd.DataFrame) -> pd.DataFrame:
         from tasks that are drawn again.
     """
     table = resolution.copy()
-    table["level"] = table.groupby(["kind", "seed"])["count"].rank(method="dense")
+    table["level"] = table.groupby(["kind", "seed", "task"])["count"].rank(method="dense")
     rows = []
     for reference in PANELS:
         known = table[table["trusted"]] if reference == "error" else table
