@@ -26,7 +26,7 @@ KINDS = {
     "varying": ("varying", "#d55e00", "^"),
     "of each task": ("varying, for each task alone", "#000000", "*"),
 }
-PANELS = {"error": "against sampled paths", "error_of_cells": "against 40 000 cells"}
+PANELS = {"error": "against sampled paths", "error_of_cells": "against very many equal cells"}
 _REPLICATES = 1000  # of tasks, for intervals
 
 
