@@ -101,10 +101,10 @@ def draw(resolution: pd.DataFrame) -> Figure:
             axes.set_title(title)
             axes.set_xscale("log")
             axes.set_yscale("log")
-            axes.set_xlabel("number of cells")
+            axes.set_xlabel("cells")
         noise = float(np.sqrt(np.nanmean(np.square(resolution["noise"]))))
         panels[0].axhline(noise, color=GUIDE, linewidth=0.6, linestyle=":", zorder=0)
-        panels[0].set_ylabel("error of $\\Phi$, root mean square")
+        panels[0].set_ylabel("error of $\\Phi$, root mean square [probability]")
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure
