@@ -33,6 +33,9 @@ from mlci.actuation.inference import ControlInference, calibrate_controls, infer
 from mlci.actuation.predicates import ControlPredicates
 from mlci.actuation.ranges import ControlRanges
 from mlci.calibration import Calibration, calibrate
+from mlci.cells.multilinear import MultilinearModel
+from mlci.cells.refined_model import RefinedModel
+from mlci.cells.refinement import refine
 from mlci.crossings import Crossing
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
@@ -104,12 +107,14 @@ __all__ = [
     "InTaskSpace",
     "Inference",
     "JointBarrier",
+    "MultilinearModel",
     "NextTask",
     "Pendulum",
     "PlanarChain",
     "Predicate",
     "PreparedInference",
     "RankErrors",
+    "RefinedModel",
     "Regions",
     "SafeSet",
     "SafetyFilter",
@@ -150,6 +155,7 @@ __all__ = [
     "prepare",
     "rank_errors",
     "read_demonstrations",
+    "refine",
     "rollout",
     "sample_sets",
     "sample_trials",

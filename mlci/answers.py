@@ -252,7 +252,7 @@ def of_cells(
 def _(
     model: TabularModel, inference: Inference, hypotheses: Bools | None
 ) -> tuple[Bools, TieClass | None]:
-    return cut_by(model.grid, inference.hypotheses), tie_class(model, inference, hypotheses)
+    return cut_by(model.equal_cells, inference.hypotheses), tie_class(model, inference, hypotheses)
 
 
 def unseen(inference: Inference) -> Ints:

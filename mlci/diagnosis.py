@@ -71,7 +71,7 @@ class Diagnosis:
 
 def diagnose(model: TabularModel) -> Diagnosis:
     """Measure how a tabular model moves; see `Diagnosis`."""
-    grid, actions = model.grid, model.actions
+    grid, actions = model.equal_cells, model.actions
     stays, taken, crossed, changing = 0, 0, 0.0, np.zeros(len(grid.shape))
     for block in model.blocks():
         moves, cell = model.moves_of(block), block[:, None]

@@ -44,7 +44,7 @@ class Displacements:
         work = Parallel(n_jobs=n_jobs, max_nbytes=None)
         parts = work(delayed(_from_centres)(centre, cells) for cells in centre.blocks())
         least, most = (np.concatenate(bounds) for bounds in zip(*parts, strict=True))
-        grid, inside = model.grid, 0.5 - 0.5 / model.samples
+        grid, inside = model.equal_cells, 0.5 - 0.5 / model.samples
         return cls(
             grid,
             np.floor(_around(grid, least, np.minimum) + 0.5 - inside - _HAIR).astype(np.int16),

@@ -8,6 +8,7 @@ be reached from the start in t moves, and so wherever no probability ever is.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,7 +18,14 @@ from mlci.demonstrations import Task
 from mlci.end_moves import first_moves, last_moves, only_moves
 from mlci.joint_avoidance import log_avoidance_beside
 from mlci.merged_moves import MergedMoves
-from mlci.recursions import Leg, backward_pass, move_probabilities, reachable_cells
+from mlci.recursions import (
+    Leg,
+    backward_levels,
+    backward_pass,
+    forward_pass,
+    move_probabilities,
+    reachable_cells,
+)
 from mlci.simulate import step_count
 from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.tabular import TabularModel
@@ -230,6 +238,22 @@ class TrajectoryDistribution:
         return log_avoidance_beside(
             self._legs, self.reachable, self.goal, self.start, log_z, others
         )
+
+    def avoidance_levels(self) -> Iterator[tuple[int, Floats]]:
+        """Each step t from T back to 0, and alpha_t (S, C) of the way from each cell on.
+
+        The array is overwritten; cells with infinite log_z[t] have no alpha.
+        """
+        return backward_levels(self._legs, self.reachable, self.goal, len(self.model.regions))
+
+    def occupancies(self) -> Floats:
+        """(T+1, S) probability of being in each cell at each step.
+
+        Raises:
+            ValueError: no trajectory reaches a goal.
+        """
+        self._require_possible("probabilities are not defined")
+        return forward_pass(self._legs, self.log_z, self.start)
 
     def violation_probabilities(self) -> Floats:
         """Phi_(i,T) = 1 - alpha_i (C,): the probability that a trajectory crosses region i."""

@@ -11,6 +11,7 @@ from functools import partial, singledispatch
 
 import numpy as np
 
+from mlci.cells.refined_model import RefinedModel
 from mlci.demonstrations import Task
 from mlci.evidence import decided_by_cell
 from mlci.maxent import TrajectoryDistribution
@@ -19,7 +20,7 @@ from mlci.sampling_errors import SamplingErrors
 from mlci.spaces import Bools, Floats
 from mlci.tabular import TabularModel
 
-Model = TabularModel | SampledModel
+Model = TabularModel | SampledModel | RefinedModel
 NO_CELLS_AT_ENDS = "a sampled model has no cells: its trajectories begin and end at states"
 
 
@@ -69,6 +70,13 @@ def _sampled_distribution(
     return model.distribution(task, round_horizon=round_horizon)
 
 
+@distribution_of.register
+def _refined_distribution(
+    model: RefinedModel, task: Task, *, round_horizon: bool = False, exact_ends: bool = True
+) -> Distribution:
+    return model.distribution(task, round_horizon=round_horizon, exact_ends=exact_ends)
+
+
 @singledispatch
 def forecasters(
     model: Model, tasks: Sequence[Task], *, round_horizon: bool, exact_ends: bool
@@ -101,6 +109,21 @@ def _of_cells(
     if tasks:
         _ = model.merged  # once for all tasks
     return [partial(forecast_of, distribution) for distribution in distributions]
+
+
+@forecasters.register
+def _of_refined_cells(
+    model: RefinedModel, tasks: Sequence[Task], *, round_horizon: bool, exact_ends: bool
+) -> list[Callable[[], Forecast]]:
+    ends = {"round_horizon": round_horizon, "exact_ends": exact_ends}
+    for task in tasks:
+        TrajectoryDistribution.of_task(model.model, task, **ends)
+    return [partial(_refined_forecast, model, task, **ends) for task in tasks]
+
+
+def _refined_forecast(model: RefinedModel, task: Task, **ends: bool) -> Forecast:
+    """The forecast of a task on its own cells."""
+    return forecast_of(model.distribution(task, **ends))
 
 
 @forecasters.register

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy  # loads scipy.sparse when it is first used
 
-from mlci.grids import Grid
+from mlci.cells.protocol import Cells
 from mlci.regions import Regions
 from mlci.spaces import Floats, Ints
 from mlci.systems import System
@@ -14,7 +14,7 @@ _CHORD_ERROR = 0.01  # of a cell's width: how far a chord may stray from the cur
 PATHS_AT_ONCE = 1 << 13  # which the second level of cache nearly holds
 
 
-def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int:
+def substep_count(system: System, grid: Cells, actions: Floats, dt: float) -> int:
     """Integrator steps a move, so that chords stay close to the curve they stand for.
 
     A chord over time t strays |x''| t^2 / 8 from its curve, with x'' = dh/dx h under a held
@@ -37,7 +37,7 @@ def substep_count(system: System, grid: Grid, actions: Floats, dt: float) -> int
     return int(np.ceil(dt / shortest - 1e-9))
 
 
-def follow(grid: Grid, regions: Regions, path: Floats) -> tuple[Ints, scipy.sparse.csr_matrix]:
+def follow(grid: Cells, regions: Regions, path: Floats) -> tuple[Ints, scipy.sparse.csr_matrix]:
     """Successor (-1 where the path leaves the space) and crossings of paths (Q, K+1, n)."""
     stays = np.all(grid.space.contains(path), axis=-1)
     successor = np.where(stays, grid.index(path[:, -1]), -1)

@@ -8,7 +8,7 @@ log_z[t, s].
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -59,6 +59,48 @@ def backward_pass(
             _step_back(*arrays, *crossings, reachable, early, late, log_z, first, levels)
         alpha[first - skip : end - skip] = levels[0, start]
     return log_z, np.minimum(alpha, 1.0)
+
+
+def backward_levels(
+    legs: Sequence[Leg], reachable: Bools, goal: Ints, regions: int
+) -> Iterator[tuple[int, Floats]]:
+    """Each step t from T back to 0, and alpha_t (S, C), which the next one overwrites.
+
+    Args as of `backward_pass`; alpha of cells that cannot be occupied has no meaning.
+    """
+    states, last = reachable.shape[1], len(reachable) - 1
+    log_z = np.full(reachable.shape, -np.inf)
+    log_z[last, goal[reachable[last, goal]]] = 0.0
+    levels = np.empty((2, states, regions))
+    levels[last % 2, goal] = 1.0
+    yield last, levels[last % 2]
+    for moves, early, late in reversed(legs):
+        arrays = moves.begins, moves.successor, moves.log_weight
+        crossings = moves.crossing_begins, moves.crossing_region
+        for t in range(late - 1, early - 1, -1):
+            _step_back(*arrays, *crossings, reachable, t, t + 1, log_z, 0, levels)
+            yield t, levels[t % 2]
+
+
+def forward_pass(legs: Sequence[Leg], log_z: Floats, start: int) -> Floats:
+    """(T+1, S) probability of being in each cell at each step.
+
+    Args:
+        legs: the moves of each part of the way, in order.
+        log_z: (T+1, S), see `backward_pass`; finite at the start.
+        start: the start cell.
+    """
+    states = log_z.shape[1]
+    occupied = np.zeros(log_z.shape)
+    occupied[0, start] = 1.0
+    for moves, early, late in legs:
+        cell, successor = np.repeat(np.arange(states), np.diff(moves.begins)), moves.successor
+        for t in range(early, late):
+            value = moves.log_weight + log_z[t + 1, successor]
+            on = np.flatnonzero((occupied[t, cell] > 0) & (value > -np.inf))
+            flow = occupied[t, cell[on]] * np.exp(value[on] - log_z[t, cell[on]])
+            occupied[t + 1] = np.bincount(successor[on], weights=flow, minlength=states)
+    return occupied
 
 
 @compiled("void(in i8[::1], in i4[::1], in f8[::1], b1[:, ::1])")

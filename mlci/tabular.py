@@ -25,6 +25,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mlci.cells.protocol import Cells
 from mlci.explored import Explored
 from mlci.grids import Grid
 from mlci.merged_moves import MergedMoves, merge_moves
@@ -49,7 +50,7 @@ class TabularModel:
 
     Attributes:
         system: the continuous system.
-        grid: the S cells.
+        grid: the S cells: `mlci.grids.Grid`, or `mlci.cells.box_tree.BoxTree`.
         actions: (A, m) controls, held for dt.
         dt: time step [s].
         regions: the C regions whose crossings are known: hypotheses, truths, or both.
@@ -66,7 +67,7 @@ class TabularModel:
     """
 
     system: System
-    grid: Grid
+    grid: Cells
     actions: Floats
     dt: float
     regions: Regions
@@ -100,7 +101,18 @@ class TabularModel:
     @property
     def moves(self) -> int:
         """M, the number of moves of a cell."""
-        return int(len(self.actions) * self.samples ** len(self.grid.shape))
+        return int(len(self.actions) * self.samples**self.grid.space.dimension)
+
+    @property
+    def equal_cells(self) -> Grid:
+        """The grid, for what needs cells of one size.
+
+        Raises:
+            TypeError: cells of varying size.
+        """
+        if not isinstance(self.grid, Grid):
+            raise TypeError(f"this needs a Grid of equal cells, not a {type(self.grid).__name__}")
+        return self.grid
 
     @cached_property
     def action(self) -> Ints:
@@ -143,7 +155,7 @@ class TabularModel:
 
     def _follow(self, cells: Ints) -> SingleMoves:
         """The moves of some cells (Q,) by the dynamics."""
-        inside = self.grid.points_inside(self.samples, cells).reshape(-1, len(self.grid.shape))
+        inside = self.grid.points_inside(self.samples, cells).reshape(-1, self.grid.space.dimension)
         controls = self.actions[:, None, :]
         path = rollout(self.system, inside, controls[:, :, None, :], self.dt, self.substeps)
         end, crosses = follow(self.grid, self.regions, path.reshape(-1, *path.shape[-2:]))
@@ -245,7 +257,7 @@ def moves_are_kept(cells: float, moves: float) -> bool:
 
 def discretize(
     system: System,
-    grid: Grid,
+    grid: Cells,
     actions: ArrayLike,
     dt: float,
     regions: Regions,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from constraint_studies import control_tables, soft_tables, transfer_tables
+from constraint_studies import control_tables, resolution_tables, soft_tables, transfer_tables
 from figure_study import cell_boxes, dimension_rows, path_rows, region_rows
 from method_studies import baseline_differences, chosen_task_tables, early_overlap_tables
 
@@ -302,6 +302,7 @@ def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
         "soft_weights": soft_tables(),
         "transfer": transfer_tables(),
         "control_limits": control_tables(),
+        "cell_errors": resolution_tables(),
         "area_cover": area_cover_tables(),
         "baselines": {"baseline_differences": baseline_differences()},
         "chosen_tasks": chosen_task_tables(),

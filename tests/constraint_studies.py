@@ -1,4 +1,4 @@
-"""Tables of studies that were never run: soft constraints, limited controls, and transfer."""
+"""Tables of studies that were never run: soft constraints, transfer, controls and cells."""
 
 import numpy as np
 import pandas as pd
@@ -53,6 +53,30 @@ def control_tables() -> dict[str, pd.DataFrame]:
     cases = pd.DataFrame({"truth": ["none", "weak", "weaker"]})
     cases["case"] = ["no limit", "at most 1", "at least -0.5"]
     return {"control_curve": pd.DataFrame(rows), "cases": cases}
+
+
+def resolution_tables() -> dict[str, pd.DataFrame]:
+    """Errors that fall with the number of cells: to the power of 0.5, and of 1 where they vary."""
+    kinds = {"centre": 0.5, "averaged": 0.5, "multilinear": 0.5, "round goals": 0.5, "varying": 1.0}
+    kinds["of each task"] = 1.0
+    rows = [
+        {
+            "seed": seed,
+            "kind": kind,
+            "count": count,
+            "task": task,
+            "possible": kind != "centre" or count > 100,
+            "error": (1 + task) * (100 / count) ** power / 10,
+            "noise": 0.002,
+            "trusted": task < 2,
+            "error_of_cells": (100 / count) ** power / 10,
+        }
+        for seed in (0, 1)
+        for kind, power in kinds.items()
+        for count in (100, 400, 1600)
+        for task in range(3)
+    ]
+    return {"resolution": pd.DataFrame(rows)}
 
 
 def transfer_tables() -> dict[str, pd.DataFrame]:

@@ -17,6 +17,7 @@ from experiments.point.measures import Measures
 from experiments.point.model_tables import model_tables
 from experiments.point.next_task_tables import next_task_table
 from experiments.point.ranking_tables import rank_table, ranking_table
+from experiments.point.resolution_tables import resolution_table
 from experiments.point.sets import set_tables
 from experiments.point.soft_tables import soft_table
 from experiments.point.streams import Purpose, stream
@@ -56,8 +57,8 @@ def point_tables(
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
         `dimensions` of the state, and `regions` of the truth. If asked for, `sets` and
         `set_marginals`; `calibration`, and `evidence` and `forecasts` where these are calibrated;
-        `baselines`, `next_task`, `soft`, `controls` and `control_ranks`, `areas` and `area_map`,
-        and those of `model_tables`.
+        `baselines`, `next_task`, `soft`, `controls` and `control_ranks`, `resolution`, `areas` and
+        `area_map`, and those of `model_tables`.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -105,6 +106,8 @@ def point_tables(
         tables |= control_tables(settings, point.beliefs.controls, rng)
     if settings.soft.weights:
         tables["soft"] = soft_table(settings, point)
+    if settings.resolution.counts:
+        tables["resolution"] = resolution_table(settings, point)
     return tables
 
 

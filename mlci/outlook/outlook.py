@@ -134,7 +134,7 @@ def outlook(
     actions = Box(model.actions.min(axis=0), model.actions.max(axis=0))
     return Outlook(
         diagnosis=diagnose(model),
-        reach=control_reach(model.system, model.grid, actions, model.dt),
+        reach=control_reach(model.system, model.equal_cells, actions, model.dt),
         expansion=float(np.mean([flow_expansion(model.system, path) for path in paths])),
         reachable=reachable,
         entered=entered,

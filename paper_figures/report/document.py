@@ -17,6 +17,7 @@ from paper_figures.report import (
     section_areas,
     section_baselines,
     section_beliefs,
+    section_cells,
     section_choices,
     section_chosen_tasks,
     section_control_noise,
@@ -165,6 +166,11 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
                 "Limits of controls: found where there are some, and imagined where not.",
             ),
         ),
+    ),
+    (
+        "Cells of varying size",
+        section_cells.section,
+        (Figure("cells", "cell_errors", "Error of Phi against the number of cells."),),
     ),
     (
         "Calibration of the posterior",

@@ -56,7 +56,7 @@ def figure(request: pytest.FixtureRequest, drawn: Drawn) -> Figure:
 def test_labels_have_units(figure: Figure) -> None:
     labels = {axes.get_xlabel() for axes in figure.axes} | {a.get_ylabel() for a in figure.axes}
     labels |= {figure.get_supylabel()}
-    counted = {"", "demonstrations", "states", "rank of truth", r"$\Phi_i$ of one trial"}
+    counted = {"", "demonstrations", "states", "cells", "rank of truth", r"$\Phi_i$ of one trial"}
     assert all(re.search(r"\[[^]]+\]$", label) for label in labels - counted), labels
 
 

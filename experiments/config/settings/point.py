@@ -40,6 +40,7 @@ from experiments.config.settings.parts import (
     TruthSettings,
 )
 from experiments.config.settings.reality import RealitySettings, read_reality
+from experiments.config.settings.resolution import ResolutionSettings
 from experiments.config.settings.sampling import ModelsSettings, SampledSettings
 from experiments.config.settings.shapes import ShapeList
 from experiments.config.settings.system import SystemSettings, read_system
@@ -154,6 +155,7 @@ class Settings(ModelSettings):
     transfer: TransferSettings
     dynamics: DynamicsSettings
     models: ModelsSettings
+    resolution: ResolutionSettings
     rollouts: Annotated[
         CountOrNone,
         about(

@@ -5,10 +5,16 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from choice_studies import area_cover_tables
-from constraint_studies import control_tables, soft_tables, transfer_tables
+from constraint_studies import control_tables, resolution_tables, soft_tables, transfer_tables
 from method_studies import early_overlap_tables
 
-from paper_figures.report import section_areas, section_controls, section_soft, section_transfer
+from paper_figures.report import (
+    section_areas,
+    section_cells,
+    section_controls,
+    section_soft,
+    section_transfer,
+)
 from paper_figures.report.chosen_for_claim_6 import chosen_tasks
 from paper_figures.report.study_tables import Missing, Results
 
@@ -67,6 +73,23 @@ def test_what_is_let_in_and_what_is_refused(tmp_path: Path) -> None:
     assert "At 2 times the controls the tube lets in 0.0 % [0.0, 1.0 %] of trials and" in narrow
     assert "refuses 50.0 % [43.1, 56.9 %] of safe states, the own safe set lets in 0.0 %" in narrow
     assert "| margin: 0.1 | 0.5 | never entered | - | 0.0 % [0.0, 8.8 %] | 10.0 % " in text
+
+
+def test_how_errors_fall_with_cells(tmp_path: Path) -> None:
+    text = section_cells.section(results(tmp_path, "cells", resolution_tables()))
+    # Of the two tasks that are trusted the errors are 1 and 2 times 0.1 (100 / count)^power.
+    assert "- against sampled paths: 400 cells, varying, err by 0.0395 [" in text
+    assert "1600 cells, equal, averaged, by 0.0395 [" in text
+    assert text.count("is met") == 4
+    line = next(line for line in text.splitlines() if line.startswith("| equal, from centres"))
+    assert "100: 0.158 [" in line
+    assert "4 of 4 tasks not possible" in line
+    assert line.endswith("| 0.50 |")
+    assert "| 1600: 0.00625 [0.00625, 0.00625] | 1.00 |" in text
+    worse = resolution_tables()["resolution"]
+    worse.loc[worse["kind"] == "varying", "error"] *= 1.1
+    text = section_cells.section(results(tmp_path / "w", "cells", {"resolution": worse}))
+    assert text.count("is missed") == 1
 
 
 def test_transfer_of_points_that_are_of_no_case_is_missing(tmp_path: Path) -> None:

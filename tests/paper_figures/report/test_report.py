@@ -501,6 +501,7 @@ def test_what_is_not_there_is_told_with_its_command(results: Results) -> None:
     text = report(results)
     studies = ("telescope", "sensitivity", "calibration", "in_cell", "readings", "wrong_model")
     more = ("soft", "transfer", "control_limits", "next_task", "baselines", "areas", "dynamics")
+    more += ("cells",)
     for study in (*studies, "rule_breaking", "control_noise", *more):
         assert f"`python experiments/run.py -m experiment={study}` makes it." in text
     assert "`make benchmark` makes it." in text

@@ -1,0 +1,28 @@
+"""What is asked of the cells: how the error of Phi falls with their number."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic.dataclasses import dataclass
+
+from experiments.config.settings.kinds import STRICT, Count, about
+
+
+@dataclass(frozen=True, config=STRICT)
+class ResolutionSettings:
+    """Equal cells, cells of varying size and multilinear moves, compared on Phi of some tasks."""
+
+    counts: Annotated[
+        tuple[Count, ...],
+        about(
+            "numbers of cells at which kinds of cells are compared; none compares nothing. Equal "
+            "cells keep the proportions of `grid.shape`, and varying ones begin with it"
+        ),
+    ]
+    tasks: Annotated[Count, about("the first so many demonstrations' tasks are compared on")]
+    paths: Annotated[Count, about("sampled paths of a task, the reference without cells")]
+    finest: Annotated[
+        Count,
+        about("equal cells that stand for the limit of the same actions, the other reference"),
+    ]

@@ -1,0 +1,172 @@
+"""How the error of Phi falls with the number of cells, for kinds of cells and of moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from experiments.config.settings import Settings
+from experiments.point.inference import PointInference
+from mlci.cells.goal_cells import goal_tree
+from mlci.cells.multilinear import MultilinearModel
+from mlci.cells.refined_model import RefinedModel
+from mlci.cells.refinement import refine
+from mlci.demonstrations import Task
+from mlci.grids import Grid
+from mlci.maxent import TrajectoryDistribution
+from mlci.sampled.distribution import SampledModel
+from mlci.spaces import Floats
+from mlci.tabular import TabularModel
+
+COLUMNS = ["kind", "count", "task", "possible", "error", "noise", "trusted", "error_of_cells"]
+CENTRE, AVERAGED, MULTILINEAR = "centre", "averaged", "multilinear"
+ROUND_GOALS, VARYING, OF_TASK = "round goals", "varying", "of each task"
+Cells = TabularModel | RefinedModel
+
+_POINTS = 2  # start points along each dimension of a cell, where there are several
+_TOLERANCE = 0.02  # of the goal, where paths are sampled: a fifth of a cell, to be near a point
+
+
+def resolution_table(settings: Settings, point: PointInference) -> pd.DataFrame:
+    """A row a kind of cells, number of them and task.
+
+    Returns:
+        `kind`: `centre`, `averaged` and `multilinear` moves of equal cells; `round goals`, averaged
+        moves of cells that are equal but for those of the goals; `varying`, averaged moves of cells
+        that are refined for all the tasks; `of each task`, likewise, but for each task
+        alone; `count` of cells; `task`; whether it is `possible`; over
+        the hypotheses the root mean square `error` of Phi against paths sampled without cells,
+        whose own standard error is the `noise`, and whether they can be `trusted`; and likewise
+        `error_of_cells`, against very many equal cells with the same actions. Where a task is not
+        possible, Phi is taken to be 0.
+    """
+    asked, regions = settings.resolution, settings.candidates
+    tasks = [each.task for each in point.demonstrations[: asked.tasks]]
+    sampled = SampledModel(
+        settings.model,
+        regions,
+        settings.dt,
+        temperature=settings.temperature,
+        samples=asked.paths,
+        seed=settings.seed,
+        tolerance=_TOLERANCE,
+        limit=settings.model.control_box,
+    )
+    distributions = [sampled.distribution(task) for task in tasks]
+    reference = np.array(
+        [
+            each.violation_probabilities() if each.is_possible else np.zeros(len(regions))
+            for each in distributions
+        ]
+    )
+    noise = [
+        _root_mean_square(each.avoidance_errors()) if each.is_possible else np.nan
+        for each in distributions
+    ]
+    base = TabularModel(
+        settings.model,
+        settings.cells,
+        settings.action_values,
+        settings.dt,
+        regions,
+        temperature=settings.temperature,
+    )
+    finest = replace(base, grid=_scaled(settings.cells, asked.finest))
+    limit = [_phi(way) for way in _ways(finest, tasks)]
+    rows = []
+    for count in asked.counts:
+        for kind, make in _KINDS.items():
+            model = make(base, tasks, count)
+            if model is None:
+                continue
+            for number, way in enumerate(_ways(model, tasks)):
+                phi = _phi(way)
+                rows.append(
+                    {
+                        "kind": kind,
+                        "count": way.model.states,
+                        "task": number,
+                        "possible": way.is_possible,
+                        "error": _root_mean_square(phi - reference[number]),
+                        "noise": noise[number],
+                        "trusted": distributions[number].diagnosis.trusted,
+                        "error_of_cells": _root_mean_square(phi - limit[number]),
+                    }
+                )
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _scaled(grid: Grid, count: int) -> Grid:
+    """A grid of about so many cells, in the same proportions."""
+    factor = (count / grid.size) ** (1 / len(grid.shape))
+    return Grid(grid.space, tuple(max(1, round(factor * each)) for each in grid.shape))
+
+
+def _ways(model: Cells, tasks: Sequence[Task]) -> list[TrajectoryDistribution]:
+    """The distributions of tasks."""
+    if isinstance(model, RefinedModel):
+        return [model.distribution(task) for task in tasks]
+    return [TrajectoryDistribution.of_task(model, task, exact_ends=True) for task in tasks]
+
+
+def _phi(way: TrajectoryDistribution) -> Floats:
+    """Phi (C,), 0 where the task is not possible."""
+    if not way.is_possible:
+        return np.zeros(len(way.model.regions))
+    return way.violation_probabilities()
+
+
+def _root_mean_square(values: Floats) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+Make = Callable[[TabularModel, Sequence[Task], int], Cells | None]
+
+
+def _centre(base: TabularModel, _tasks: Sequence[Task], count: int) -> TabularModel:
+    return replace(base, grid=_scaled(base.equal_cells, count))
+
+
+def _averaged(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularModel:
+    return replace(_centre(base, tasks, count), samples=_POINTS)
+
+
+def _multilinear(base: TabularModel, _tasks: Sequence[Task], count: int) -> TabularModel:
+    return MultilinearModel(
+        base.system,
+        _scaled(base.equal_cells, count),
+        base.actions,
+        base.dt,
+        base.regions,
+        temperature=base.temperature,
+    )
+
+
+def _round_goals(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularModel:
+    grid = _scaled(base.equal_cells, count)
+    tree = goal_tree(grid, [task.goal for task in tasks], grid.widths)
+    return replace(base, grid=tree, samples=_POINTS)
+
+
+def _varying(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularModel | None:
+    """None where the first cells are more than these already."""
+    return refine(replace(base, samples=_POINTS), tasks, count) if count >= base.states else None
+
+
+def _of_task(base: TabularModel, _tasks: Sequence[Task], count: int) -> RefinedModel | None:
+    """None likewise."""
+    averaged = replace(base, samples=_POINTS)
+    return RefinedModel(averaged, count) if count >= base.states else None
+
+
+_KINDS: dict[str, Make] = {
+    CENTRE: _centre,
+    AVERAGED: _averaged,
+    MULTILINEAR: _multilinear,
+    ROUND_GOALS: _round_goals,
+    VARYING: _varying,
+    OF_TASK: _of_task,
+}

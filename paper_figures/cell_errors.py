@@ -1,0 +1,134 @@
+"""How the error of Phi falls with the number of cells, for equal cells and for others."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from paper_figures.rows import Unsuited
+from paper_figures.style import GUIDE, PAGE, RC, new_figure
+
+TABLES = {
+    "resolution": (
+        *("seed", "kind", "count", "task", "possible"),
+        *("error", "noise", "trusted", "error_of_cells"),
+    ),
+}
+
+# In order of the legend: what a kind of cells is called, its colour and its mark.
+KINDS = {
+    "centre": ("equal, from centres", "#7f7f7f", "s"),
+    "averaged": ("equal, averaged", "#56b4e9", "o"),
+    "multilinear": ("equal, multilinear", "#cc79a7", "D"),
+    "round goals": ("equal, goals in the middle", "#009e73", "v"),
+    "varying": ("varying", "#d55e00", "^"),
+    "of each task": ("varying, for each task alone", "#000000", "*"),
+}
+PANELS = {"error": "against sampled paths", "error_of_cells": "against very many equal cells"}
+_REPLICATES = 1000  # of tasks, for intervals
+
+
+def error_rows(resolution: pd.DataFrame) -> pd.DataFrame:
+    """A row a reference, kind of cells and number of them that was asked for.
+
+    Numbers that are asked for lead to slightly different ones where cells are split round goals;
+    they are taken together by their order within a kind, seed and task.
+
+    Returns:
+        `reference`, a column of PANELS; `kind`; mean `count`; `tasks`, and how many of them the
+        cells can do (`possible`); root mean square `error`, with a 95 % interval, `low` to `high`,
+        from tasks that are drawn again.
+    """
+    table = resolution.copy()
+    table["level"] = table.groupby(["kind", "seed", "task"])["count"].rank(method="dense")
+    rows = []
+    for reference in PANELS:
+        known = table[table["trusted"]] if reference == "error" else table
+        for (kind, _), group in known.groupby(["kind", "level"]):
+            squares = np.square(group[reference].to_numpy())
+            rng = np.random.default_rng(0)
+            again = rng.choice(squares, (_REPLICATES, len(squares))).mean(axis=1)
+            low, high = np.sqrt(np.quantile(again, [0.025, 0.975]))
+            rows.append(
+                {
+                    "reference": reference,
+                    "kind": kind,
+                    "count": group["count"].mean(),
+                    "tasks": len(group),
+                    "possible": int(group["possible"].sum()),
+                    "error": float(np.sqrt(squares.mean())),
+                    "low": low,
+                    "high": high,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def slope(rows: pd.DataFrame) -> float:
+    """The order of convergence in the number of cells, where the cells can do every task.
+
+    The least squares fit of log error to log number; NaN of fewer than two.
+    """
+    able = rows[rows["possible"] == rows["tasks"]]
+    if len(able) < 2:
+        return np.nan
+    return float(-np.polyfit(np.log(able["count"]), np.log(able["error"]), 1)[0])
+
+
+def draw(resolution: pd.DataFrame) -> Figure:
+    """Draw a panel a reference, with a line a kind of cells."""
+    if resolution["count"].nunique() < 2:
+        raise Unsuited("one number of cells makes no line")
+    rows = error_rows(resolution)
+    figure, panels = new_figure(PAGE, 3.0, ncols=len(PANELS), sharey=True)
+    with plt.rc_context(RC):
+        for axes, (reference, title) in zip(panels, PANELS.items(), strict=True):
+            for kind, (label, colour, mark) in KINDS.items():
+                some = rows[(rows["reference"] == reference) & (rows["kind"] == kind)]
+                some = some[some["possible"] == some["tasks"]]
+                axes.errorbar(
+                    some["count"],
+                    some["error"],
+                    [some["error"] - some["low"], some["high"] - some["error"]],
+                    color=colour,
+                    marker=mark,
+                    linewidth=1.0,
+                    elinewidth=0.5,
+                    label=label,
+                )
+            axes.set_title(title)
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_xlabel("cells")
+        noise = float(np.sqrt(np.nanmean(np.square(resolution["noise"]))))
+        panels[0].axhline(noise, color=GUIDE, linewidth=0.6, linestyle=":", zorder=0)
+        panels[0].set_ylabel("error of $\\Phi$, root mean square [probability]")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
+
+
+def facts(resolution: pd.DataFrame) -> str:
+    """What the caption says."""
+    rows = error_rows(resolution)
+    lines = [
+        "Root mean square error of Phi over hypotheses and tasks against the number of cells, with",
+        "95 % intervals from tasks that are drawn again. Left: against paths sampled without cells",
+        "(dotted: their standard error); right: against very many equal cells with the same",
+        "actions. Only numbers of cells that can do every task are drawn.",
+    ]
+    for (reference, kind), some in rows.groupby(["reference", "kind"], sort=False):
+        order = slope(some)
+        errors = ", ".join(
+            f"{row.error:.3f} [{row.low:.3f}, {row.high:.3f}] of {row.count:.0f}"
+            for row in some.rename(columns={"count": "cells"})
+            .assign(count=some["count"])
+            .itertuples(index=False)
+        )
+        lines.append(
+            f"  {PANELS[reference]}, {KINDS[kind][0]}: {errors} cells; error falls with number to "
+            f"the power of {order:.2f}"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,141 @@
+"""Cells that are refined for tasks."""
+
+import numpy as np
+import pytest
+
+import mlci
+from mlci.baselines import occupancy
+from mlci.cells.box_tree import BoxTree
+from mlci.cells.goal_cells import goal_tree
+from mlci.cells.importance import importance, neighbours
+from mlci.cells.multilinear import MultilinearModel
+from mlci.cells.refinement import refine
+from mlci.exploration import explore
+from mlci.maxent import TrajectoryDistribution
+
+PENDULUM = mlci.Pendulum()
+HYPOTHESES = mlci.Regions.from_grid(PENDULUM.space, (10, 10))
+GRID = mlci.Grid(PENDULUM.space, (10, 10))
+TASKS = [
+    mlci.Task(np.array([1.0, 0.5]), mlci.Box.point([2.7, -0.4]), 3.0),
+    mlci.Task(np.array([3.0, -1.0]), mlci.Box.point([2.1, 1.3]), 3.0),
+]
+
+
+def model(cells: mlci.Grid | BoxTree = GRID, samples: int = 2) -> mlci.TabularModel:
+    actions = mlci.action_grid(PENDULUM, 7)
+    return mlci.TabularModel(PENDULUM, cells, actions, 0.25, HYPOTHESES, samples=samples)
+
+
+def phi(of: mlci.TabularModel) -> np.ndarray:
+    ways = [TrajectoryDistribution.of_task(of, task, exact_ends=True) for task in TASKS]
+    return np.array([way.violation_probabilities() for way in ways])
+
+
+@pytest.fixture(scope="module")
+def refined() -> mlci.TabularModel:
+    return refine(model(), TASKS, 250)
+
+
+def test_refined_cells_are_worth_many_equal_ones(refined: mlci.TabularModel) -> None:
+    fine = phi(model(mlci.Grid(PENDULUM.space, (100, 100)), samples=1))
+    equal, varying = (
+        np.sqrt(np.mean((phi(each) - fine) ** 2))
+        for each in (model(mlci.Grid(PENDULUM.space, (20, 20))), refined)
+    )
+    assert refined.states == 250
+    assert varying < 0.9 * equal  # of 400 cells
+
+
+def test_the_same_cells_each_time_and_goals_in_their_middle(refined: mlci.TabularModel) -> None:
+    tree = refine(model(), TASKS, 250).grid
+    assert np.array_equal(tree.centers, refined.grid.centers)
+    goals = [task.goal.lower for task in TASKS]
+    assert tree.centers[tree.index(goals)] == pytest.approx(np.array(goals))
+    more = refine(refined, TASKS, 260)  # goes on from a tree
+    assert more.states == 260
+    assert np.isin(refined.grid.corners[0][:, 0], more.grid.corners[0][:, 0]).all()
+
+
+def test_moves_of_cells_that_tasks_come_by_are_enough(refined: mlci.TabularModel) -> None:
+    short = [mlci.Task(TASKS[0].start, mlci.Box.point([1.4, 0.6]), 0.5)]
+    active = explore(refined, short, bounded=False)
+    assert active.explored is not None
+    assert np.sum(active.explored.cells) < 0.7 * refined.states
+    of_all, of_active = (
+        TrajectoryDistribution.of_task(each, short[0], exact_ends=True).violation_probabilities()
+        for each in (refined, active)
+    )
+    assert of_active == pytest.approx(of_all, abs=1e-12)
+
+
+def test_cells_that_cannot_do_a_task_are_refined_too() -> None:
+    coarse = model(mlci.Grid(PENDULUM.space, (4, 4)), samples=1)
+    task = TrajectoryDistribution.of_task(coarse, TASKS[0], exact_ends=True)
+    assert not task.is_possible
+    assert refine(coarse, TASKS, 30).states == 30
+
+
+def test_visits_and_levels_are_those_of_the_distribution() -> None:
+    one = model(samples=1)
+    start, goal = one.grid.index([[1.0, 0.5], [2.1, 1.3]])
+    task = TrajectoryDistribution(one, int(start), np.array([goal]), 12)
+    visits = task.occupancies()
+    assert np.sum(visits, axis=1) == pytest.approx(1.0)
+    assert np.sum(visits, axis=0) == pytest.approx(occupancy(task), abs=1e-12)
+    levels = {t: alpha.copy() for t, alpha in task.avoidance_levels()}
+    assert sorted(levels) == list(range(13))
+    assert levels[0][start] == pytest.approx(task.avoidance_probabilities(), abs=1e-12)
+    # What is avoided from a later step on is avoided more often than from the start.
+    on_average = visits[6] @ np.nan_to_num(levels[6])
+    assert np.all(on_average >= levels[0][start] - 1e-12)
+
+
+def test_neighbours_share_a_face() -> None:
+    tree = goal_tree(GRID, [TASKS[0].goal], GRID.widths / 3)
+    found = neighbours(tree)
+    lower, upper = tree.corners
+    for d in range(2):
+        below = found[:, d, 0]
+        known = np.flatnonzero(below >= 0)
+        face = PENDULUM.space.difference(upper[below[known]], lower[known])[:, d]
+        assert face == pytest.approx(0.0, abs=1e-12)
+    assert np.all(found[:, 0] >= 0)  # the angle goes round
+    assert np.array_equal(found[:, 1, 0] == -1, lower[:, 1] == -6)
+
+
+def test_cells_that_are_not_visited_do_not_matter() -> None:
+    tree = goal_tree(GRID, [], GRID.widths)
+    task = TrajectoryDistribution.of_task(model(tree), TASKS[0], exact_ends=True)
+    matters = importance(task, tree)
+    visited = np.sum(task.occupancies()[1:-1], axis=0) > 0
+    assert np.all(matters[~visited] == 0)
+    assert np.all(matters[visited] > 0)
+    assert 0.2 < np.mean(visited) < 0.95
+
+
+def test_inference_on_cells_of_each_task() -> None:
+    own = mlci.RefinedModel(model(), 150)
+    prepared = mlci.prepare(own, TASKS)
+    for task, avoidance in zip(TASKS, prepared.avoidance, strict=True):
+        alone = refine(model(), [task], 150)
+        way = TrajectoryDistribution.of_task(alone, task, exact_ends=True)
+        assert avoidance == pytest.approx(way.avoidance_probabilities(), abs=1e-12)
+    assert prepared.reachable.all()
+    with pytest.raises(ValueError, match="there are 100 cells already"):
+        mlci.RefinedModel(model(), 50)
+    outside = mlci.Task(np.array([1.0, 9.0]), TASKS[0].goal, 3.0)
+    with pytest.raises(ValueError, match="outside the state space"):
+        mlci.prepare(own, [outside])
+
+
+def test_what_cannot_be_refined_is_refused() -> None:
+    with pytest.raises(ValueError, match="there is none"):
+        refine(model(), [], 250)
+    with pytest.raises(ValueError, match="there are 100 cells already"):
+        refine(model(), TASKS, 50)
+    with pytest.raises(ValueError, match=r"lies in \(0, 1\], not 0"):
+        refine(model(), TASKS, 250, growth=0)
+    shared = MultilinearModel(PENDULUM, GRID, mlci.action_grid(PENDULUM, 3), 0.25, HYPOTHESES)
+    with pytest.raises(TypeError, match="not of a MultilinearModel"):
+        refine(shared, TASKS, 250)
