@@ -1,0 +1,92 @@
+"""All worlds and methods: those of the benchmark, and those of files that a user adds."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+from experiments.field.entries import Method, World
+from experiments.field.methods import METHODS
+from experiments.field.worlds import mazes, scobee, walls
+from experiments.tracking.files import digest, read_file
+from experiments.tracking.sources import source_hash
+
+
+@dataclass(frozen=True)
+class Catalog:
+    """Worlds and methods by name.
+
+    Attributes:
+        worlds: the worlds.
+        methods: the methods.
+        added: digests of the files that were added, by the name of their module.
+    """
+
+    worlds: dict[str, World]
+    methods: dict[str, Method]
+    added: dict[str, str]
+
+    def source(self, *functions: object) -> str:
+        """A hash of the code that some functions run."""
+        modules = {_module(function) for function in functions}
+        files = [self.added[name] for name in sorted(modules & self.added.keys())]
+        own = sorted(modules - self.added.keys() | {"experiments.field.scores"})
+        return digest("".join([source_hash(own), *files]).encode())
+
+
+@cache
+def load(added: tuple[Path, ...] = ()) -> Catalog:
+    """The catalog with the worlds and methods of some files.
+
+    A file has `WORLDS`, `METHODS` or both: dictionaries from names to `World` and `Method`.
+
+    Raises:
+        ValueError: a file without either, or a name that is there already.
+    """
+    worlds = {**scobee.WORLDS, **walls.WORLDS, **mazes.WORLDS}
+    methods = dict(METHODS)
+    digests = {}
+    for path in added:
+        module = _imported(path)
+        more = getattr(module, "WORLDS", {}), getattr(module, "METHODS", {})
+        if not any(more):
+            raise ValueError(f"{path} has neither WORLDS nor METHODS: see experiments/field/README")
+        for known, new in zip((worlds, methods), more, strict=True):
+            if twice := known.keys() & new.keys():
+                raise ValueError(f"{path}: {', '.join(sorted(twice))} is there already: rename it")
+            known.update(new)
+        digests[module.__name__] = digest(read_file(path.resolve()))
+    return Catalog(worlds, methods, digests)
+
+
+def chosen(known: Sequence[str], names: Sequence[str] | None, what: str) -> list[str]:
+    """Some names of those that are known; all if none are given.
+
+    Raises:
+        ValueError: a name that is not.
+    """
+    if unknown := [name for name in names or () if name not in known]:
+        raise ValueError(f"no {what} is called {', '.join(unknown)}; there are {', '.join(known)}")
+    return [name for name in known if not names or name in names]
+
+
+def _imported(path: Path) -> ModuleType:
+    """The module of a file."""
+    name = f"field_entry_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise ValueError(f"{path} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _module(function: object) -> str:
+    """The name of the module in which a function, or what `partial` made of it, is written."""
+    return str(getattr(getattr(function, "func", function), "__module__", ""))

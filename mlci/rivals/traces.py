@@ -1,0 +1,78 @@
+"""Scores of hypotheses by what demonstrators leave out, with no account of chance.
+
+`visits` is what matching of feature expectations looks at (Abbeel and Ng 2004; Ziebart et al.
+2008); `crossings` counts sampled unconstrained paths; `nearest` takes the hypotheses that
+demonstrators pass most closely; `density` is a one-class rule for positive and unlabelled data
+(Elkan and Noto 2008): the unconstrained agent's visits are unlabelled, the demonstrators' are
+positive, and what is visited by the agent alone is negative. As `mlci.baselines`, which are for
+tabular models, in the common form of `mlci.rivals.problem`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mlci.rivals.problem import Problem
+from mlci.spaces import Floats
+
+_WIDTH = 0.5  # of a kernel, in widths of a hypothesis
+_FLOOR = 1e-3  # visits that both densities have everywhere, so that nothing is divided by nothing
+
+
+def visits(problem: Problem) -> Floats:
+    """(C,) expected less empirical number of moves of each hypothesis, a mean over paths."""
+    total = -np.sum([problem.moves_inside(j) for j in range(len(problem.shown))], axis=0)
+    for agent, numbers in problem.tasks:
+        if agent.is_possible:
+            total += len(numbers) * (agent.table.crosses.T @ agent.flows)
+    return np.asarray(total / len(problem.shown))
+
+
+def crossings(problem: Problem, paths: int, rng: np.random.Generator) -> Floats:
+    """(C,) share of sampled unconstrained paths that cross each hypothesis, over all tasks."""
+    total = np.zeros(problem.regions)
+    for agent, numbers in problem.tasks:
+        if agent.is_possible:
+            crossed = [agent.table.crossed_by(path) for path in agent.sample(paths, rng)]
+            total += len(numbers) * np.mean(crossed, axis=0)
+    return total / len(problem.shown)
+
+
+def nearest(problem: Problem) -> Floats:
+    """(C,) minus the distance from each hypothesis to the nearest state that was visited."""
+    seen = np.flatnonzero(_demonstrators(problem) > 0)
+    distance = np.min(_distances(problem)[:, seen], axis=1)
+    return -np.array([np.min(distance[column], initial=np.inf) for column in problem.inside.T])
+
+
+def density(problem: Problem) -> Floats:
+    """(C,) share of a hypothesis's smoothed visits that no demonstrator made, weighed by visits."""
+    kernel = np.exp(-((_distances(problem) / _WIDTH) ** 2) / 2)
+    kernel /= np.sum(kernel, axis=0)
+    agents, demonstrators = kernel @ _agents(problem), kernel @ _demonstrators(problem)
+    total = (agents + demonstrators + _FLOOR) @ problem.inside
+    return np.asarray((agents @ problem.inside) / np.maximum(total, _FLOOR))
+
+
+def _agents(problem: Problem) -> Floats:
+    """(S,) expected visits of the unconstrained agents, a mean over demonstrations."""
+    total = np.zeros(len(problem.positions))
+    for agent, numbers in problem.tasks:
+        if agent.is_possible:
+            total += len(numbers) * agent.expected_visits
+    return total / len(problem.shown)
+
+
+def _demonstrators(problem: Problem) -> Floats:
+    """(S,) visits of the demonstrators, likewise."""
+    states = np.concatenate([each.states for each in problem.shown])
+    return np.bincount(states, minlength=len(problem.positions)) / len(problem.shown)
+
+
+def _distances(problem: Problem) -> Floats:
+    """(S, S) distances between states, in widths of a hypothesis; round an axis that wraps."""
+    gap = np.abs(problem.positions[:, None] - problem.positions[None])
+    for axis, wraps in enumerate(problem.wraps):
+        if wraps:
+            gap[..., axis] = np.minimum(gap[..., axis], problem.shape[axis] - gap[..., axis])
+    return np.asarray(np.sqrt(np.sum(gap**2, axis=-1)))
