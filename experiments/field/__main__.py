@@ -41,7 +41,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seeds", type=int, default=SEEDS, help="how many seeds [%(default)s]")
     parser.add_argument("--demonstrations", type=int, help="how many each world shows")
     parser.add_argument("--workers", type=int, default=-1, help="processes [one a core]")
-    parser.add_argument("--out", type=Path, default=default_results() / "field", help="folder of results")
+    parser.add_argument(
+        "--out", type=Path, default=default_results() / "field", help="folder of results"
+    )
     parser.add_argument(
         "--add", nargs="+", type=Path, default=[], help="Python files with WORLDS or METHODS"
     )

@@ -12,7 +12,7 @@ from types import ModuleType
 
 from experiments.field.entries import Method, World
 from experiments.field.methods import METHODS
-from experiments.field.worlds import mazes, scobee, walls
+from experiments.field.worlds import mazes, pendulums, plane, scobee, walls
 from experiments.tracking.files import digest, read_file
 from experiments.tracking.sources import source_hash
 
@@ -48,7 +48,11 @@ def load(added: tuple[Path, ...] = ()) -> Catalog:
     Raises:
         ValueError: a file without either, or a name that is there already.
     """
-    worlds = {**scobee.WORLDS, **walls.WORLDS, **mazes.WORLDS}
+    worlds = {
+        name: world
+        for module in (scobee, pendulums, walls, plane, mazes)
+        for name, world in module.WORLDS.items()
+    }
     methods = dict(METHODS)
     digests = {}
     for path in added:

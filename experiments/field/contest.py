@@ -14,8 +14,10 @@ import pandas as pd
 from joblib import Parallel, delayed
 
 from experiments.field.catalog import load
+from experiments.field.entries import Case
 from experiments.field.scores import score
 from experiments.tracking.files import json_bytes, read_file, replace_file
+from mlci.rivals.set_gains import set_gains
 
 _RUNS = ".runs"  # folder of one file for each world, method and seed
 
@@ -84,7 +86,9 @@ def _each(
         path = folder / _RUNS / world / name.replace(":", "") / f"{seed}.json"
         row = _kept(path, key)
         if row is None:
-            case = case or entry.make(seed, count)
+            if case is None:
+                case = entry.make(seed, count)
+                _warm_up(case)
             rng = np.random.default_rng([seed, crc32(world.encode()), crc32(name.encode())])
             begin = time.process_time()
             answer = method.answer(case.problem, rng)
@@ -95,6 +99,11 @@ def _each(
             row = {k: None if v != v else v for k, v in row.items()}  # JSON has no nan
             replace_file(path, json_bytes({"key": key, "row": row}))
         yield row
+
+
+def _warm_up(case: Case) -> None:
+    """Compile what all methods use, so that none of them is charged for it."""
+    set_gains(case.problem).beside(np.zeros(case.problem.regions, dtype=bool))
 
 
 def _kept(path: Path, key: str) -> dict[str, Any] | None:

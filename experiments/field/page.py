@@ -65,14 +65,16 @@ def page_text(
         "## How worlds were made\n",
         _table(
             ["world", "source", "setting", "what differs"],
-            [[name, w.source, w.setting, w.differs] for name, w in catalog.worlds.items()
-             if name in worlds],
+            [
+                [name, w.source, w.setting, w.differs]
+                for name, w in catalog.worlds.items()
+                if name in worlds
+            ],
         ),
         "## How methods were made\n",
         _table(
             ["method", "source", "what differs"],
-            [[name, m.source, m.differs] for name, m in catalog.methods.items()
-             if name in methods],
+            [[name, m.source, m.differs] for name, m in catalog.methods.items() if name in methods],
         ),
     ]
     return "\n".join(parts)
@@ -104,7 +106,10 @@ with its 95 % interval. The best of several is picked on both sides by the same 
 def _overall(board: pd.DataFrame, methods: list[str], told: set[str]) -> str:
     """A row a method: means over worlds."""
     table = board.pivot_table(index="method", columns="score", values="mean", aggfunc="mean")
-    rows = [[_named(m, told), *(_number(table[s].get(m)) for s in SCORES if s in table)] for m in methods]
+    rows = [
+        [_named(m, told), *(_number(table[s].get(m)) for s in SCORES if s in table)]
+        for m in methods
+    ]
     return _table(["method", *(SCORES[s][0] for s in SCORES if s in table)], rows)
 
 

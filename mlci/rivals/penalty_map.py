@@ -42,4 +42,3 @@ def penalty_map(problem: Problem, iterations: int = 30, spread: float = 20.0) ->
         ascent = mean / (1 - 0.9**k) / (np.sqrt(square / (1 - 0.99**k)) + 1e-4)
         theta = np.maximum(theta + _RATE * ascent, 0.0)
     return theta
-

@@ -58,9 +58,7 @@ def _remembered(beside: Beside) -> Beside:
     return asked
 
 
-def _silent(
-    problem: Problem, exact: list[Beside | None], between: list[Beside | None]
-) -> Bools:
+def _silent(problem: Problem, exact: list[Beside | None], between: list[Beside | None]) -> Bools:
     """(N, C) pairs that a cell decides."""
     nothing, silent = np.zeros(problem.regions, dtype=bool), np.zeros_like(problem.violated)
     for j, (states, cells) in enumerate(zip(exact, between, strict=True)):

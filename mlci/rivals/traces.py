@@ -10,10 +10,12 @@ tabular models, in the common form of `mlci.rivals.problem`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from mlci.rivals.problem import Problem
-from mlci.spaces import Floats
+from mlci.spaces import Bools, Floats, Ints
 
 _WIDTH = 0.5  # of a kernel, in widths of a hypothesis
 _FLOOR = 1e-3  # visits that both densities have everywhere, so that nothing is divided by nothing
@@ -21,10 +23,12 @@ _FLOOR = 1e-3  # visits that both densities have everywhere, so that nothing is 
 
 def visits(problem: Problem) -> Floats:
     """(C,) expected less empirical number of moves of each hypothesis, a mean over paths."""
-    total = -np.sum([problem.moves_inside(j) for j in range(len(problem.shown))], axis=0)
+    total: Floats = np.zeros(problem.regions)
+    for j in range(len(problem.shown)):
+        total = total - problem.moves_inside(j)
     for agent, numbers in problem.tasks:
         if agent.is_possible:
-            total += len(numbers) * (agent.table.crosses.T @ agent.flows)
+            total = total + len(numbers) * (agent.table.crosses.T @ agent.flows)
     return np.asarray(total / len(problem.shown))
 
 
@@ -39,19 +43,54 @@ def crossings(problem: Problem, paths: int, rng: np.random.Generator) -> Floats:
 
 
 def nearest(problem: Problem) -> Floats:
-    """(C,) minus the distance from each hypothesis to the nearest state that was visited."""
-    seen = np.flatnonzero(_demonstrators(problem) > 0)
-    distance = np.min(_distances(problem)[:, seen], axis=1)
-    return -np.array([np.min(distance[column], initial=np.inf) for column in problem.inside.T])
+    """(C,) minus the distance from each hypothesis to the nearest place that was visited."""
+    places = _Places.of(problem)
+    seen = np.flatnonzero(places.total(_demonstrators(problem)) > 0)
+    distance = np.min(places.distances[:, seen], axis=1)
+    return -np.array([np.min(distance[column], initial=np.inf) for column in places.inside.T])
 
 
 def density(problem: Problem) -> Floats:
-    """(C,) share of a hypothesis's smoothed visits that no demonstrator made, weighed by visits."""
-    kernel = np.exp(-((_distances(problem) / _WIDTH) ** 2) / 2)
+    """(C,) share of a hypothesis's smoothed visits that no demonstrator made."""
+    places = _Places.of(problem)
+    kernel = np.exp(-((places.distances / _WIDTH) ** 2) / 2)
     kernel /= np.sum(kernel, axis=0)
-    agents, demonstrators = kernel @ _agents(problem), kernel @ _demonstrators(problem)
-    total = (agents + demonstrators + _FLOOR) @ problem.inside
-    return np.asarray((agents @ problem.inside) / np.maximum(total, _FLOOR))
+    agents, demonstrators = (
+        kernel @ places.total(visits) for visits in (_agents(problem), _demonstrators(problem))
+    )
+    total = (agents + demonstrators + _FLOOR) @ places.inside
+    return np.asarray((agents @ places.inside) / np.maximum(total, _FLOOR))
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """The P different places of states.
+
+    Attributes:
+        number: (S,) the place of each state.
+        inside: (P, C) boolean: which places belong to which hypothesis.
+        distances: (P, P) in widths of a hypothesis; round an axis that wraps.
+    """
+
+    number: Ints
+    inside: Bools
+    distances: Floats
+
+    @classmethod
+    def of(cls, problem: Problem) -> _Places:
+        """Those of a problem."""
+        places, first, number = np.unique(
+            problem.positions, axis=0, return_index=True, return_inverse=True
+        )
+        gap = np.abs(places[:, None] - places[None])
+        for axis, wraps in enumerate(problem.wraps):
+            if wraps:
+                gap[..., axis] = np.minimum(gap[..., axis], problem.shape[axis] - gap[..., axis])
+        return cls(number.ravel(), problem.inside[first], np.sqrt(np.sum(gap**2, axis=-1)))
+
+    def total(self, visits: Floats) -> Floats:
+        """(P,) visits of the states (S,) of each place."""
+        return np.bincount(self.number, visits, minlength=len(self.inside))
 
 
 def _agents(problem: Problem) -> Floats:
@@ -67,12 +106,3 @@ def _demonstrators(problem: Problem) -> Floats:
     """(S,) visits of the demonstrators, likewise."""
     states = np.concatenate([each.states for each in problem.shown])
     return np.bincount(states, minlength=len(problem.positions)) / len(problem.shown)
-
-
-def _distances(problem: Problem) -> Floats:
-    """(S, S) distances between states, in widths of a hypothesis; round an axis that wraps."""
-    gap = np.abs(problem.positions[:, None] - problem.positions[None])
-    for axis, wraps in enumerate(problem.wraps):
-        if wraps:
-            gap[..., axis] = np.minimum(gap[..., axis], problem.shape[axis] - gap[..., axis])
-    return np.asarray(np.sqrt(np.sum(gap**2, axis=-1)))

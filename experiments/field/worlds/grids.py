@@ -62,7 +62,10 @@ def certain_avoidance(table: Table, steps: int) -> Beside:
 
 def violates(table: Table, path: TablePath) -> np.ndarray:
     """(C,) the hypotheses that some move of a path belongs to."""
-    return np.asarray(table.crosses[path.states[:-1] * table.actions + path.actions].sum(0)).ravel() > 0
+    return (
+        np.asarray(table.crosses[path.states[:-1] * table.actions + path.actions].sum(0)).ravel()
+        > 0
+    )
 
 
 def grid_case(
