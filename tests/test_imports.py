@@ -20,6 +20,7 @@ MLCI = {
     "mlci.actuation": "",
     "mlci.areas": "",
     "mlci.control": "",
+    "mlci.rivals": "",
     "mlci.safety": "",
     "mlci.sampled": "",
     "mlci.sets": "",
@@ -96,6 +97,12 @@ MLCI = {
     "mlci.areas.overlap": "mlci.spaces",
     "mlci.areas.evidence": "mlci.misfit mlci.evidence",
     "mlci.areas.belief": "mlci.areas.evidence mlci.areas.overlap mlci.credible_sets",
+    "mlci.rivals.agent": "mlci.worlds.tables",
+    "mlci.rivals.problem": "mlci.rivals.agent",
+    "mlci.rivals.set_gains": "mlci.rivals.problem mlci.sets.evidence",
+    "mlci.rivals.traces": "mlci.rivals.problem",
+    "mlci.rivals.penalty_map": "mlci.rivals.problem",
+    "mlci.rivals.printed": "mlci.rivals.problem mlci.worlds.fixed_horizon",
     "mlci.diagnosis": "mlci.tabular",
     "mlci.end_moves": "mlci.tabular",
     "mlci.recursions": "mlci.compiled mlci.tabular",
@@ -172,6 +179,7 @@ ROOMS = {
     "experiments.sweep": f"{POINT} experiments.terminal experiments.point experiments.collate",
     "experiments.lookback": f"mlci {TRACKING} experiments.collate experiments.config.paths "
     "experiments.config.suggestions experiments.terminal",
+    "experiments.field": f"mlci {TRACKING} experiments.config.paths",
     "experiments.page": "mlci experiments.belief_lines experiments.console experiments.terminal",
     "experiments.page.of_point": f"{POINT} experiments.console experiments.point experiments.page "
     "experiments.lookback",

@@ -1,1 +1,1 @@
-"""A benchmark of the field: methods that infer constraints, in worlds whose constraints are known."""
+"""A benchmark of the field: methods that infer constraints, where these are known."""

@@ -12,7 +12,7 @@ from types import ModuleType
 
 from experiments.field.entries import Method, World
 from experiments.field.methods import METHODS
-from experiments.field.worlds import mazes, pendulums, plane, scobee, walls
+from experiments.field.worlds import mazes, pendulums, plane, recorded, scobee, walls
 from experiments.tracking.files import digest, read_file
 from experiments.tracking.sources import source_hash
 
@@ -24,7 +24,8 @@ class Catalog:
     Attributes:
         worlds: the worlds.
         methods: the methods.
-        added: digests of the files that were added, by the name of their module.
+        added: digests of the files that were added, and of what they use of this project, by the
+            name of their module.
     """
 
     worlds: dict[str, World]
@@ -41,9 +42,10 @@ class Catalog:
 
 @cache
 def load(added: tuple[Path, ...] = ()) -> Catalog:
-    """The catalog with the worlds and methods of some files.
+    """The catalog with the worlds and methods of some files, and worlds of folders of recordings.
 
-    A file has `WORLDS`, `METHODS` or both: dictionaries from names to `World` and `Method`.
+    A folder is as `worlds.recorded` says, and its world has its name. A file has `WORLDS`,
+    `METHODS` or both: dictionaries from names to `World` and `Method`.
 
     Raises:
         ValueError: a file without either, or a name that is there already.
@@ -56,6 +58,9 @@ def load(added: tuple[Path, ...] = ()) -> Catalog:
     methods = dict(METHODS)
     digests = {}
     for path in added:
+        if path.is_dir():
+            worlds[f"recorded: {path.name}"] = recorded.world(path)
+            continue
         module = _imported(path)
         more = getattr(module, "WORLDS", {}), getattr(module, "METHODS", {})
         if not any(more):
@@ -64,7 +69,8 @@ def load(added: tuple[Path, ...] = ()) -> Catalog:
             if twice := known.keys() & new.keys():
                 raise ValueError(f"{path}: {', '.join(sorted(twice))} is there already: rename it")
             known.update(new)
-        digests[module.__name__] = digest(read_file(path.resolve()))
+        file = digest(read_file(path.resolve()))
+        digests[module.__name__] = f"{file} {source_hash(_of_this_project(module))}"
     return Catalog(worlds, methods, digests)
 
 
@@ -89,6 +95,15 @@ def _imported(path: Path) -> ModuleType:
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
+
+
+def _of_this_project(module: ModuleType) -> list[str]:
+    """The modules of this project whose functions and classes a module uses by name."""
+    names = {
+        str(getattr(value, "__module__", None) or getattr(value, "__name__", ""))
+        for value in vars(module).values()
+    }
+    return sorted(name for name in names if name.partition(".")[0] in ("experiments", "mlci"))
 
 
 def _module(function: object) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -45,44 +45,38 @@ def contest(
         workers: processes.
         demonstrations: how many each world shows; None is what the world says.
     """
-    jobs = [(world, seed) for seed in seeds for world in worlds]
+    catalog = load(added)  # code is read once: what changes meanwhile does not run either
+    keys = {
+        world: {
+            method: catalog.source(catalog.worlds[world].make, catalog.methods[method].answer)
+            for method in methods
+        }
+        for world in worlds
+    }
     done = Parallel(n_jobs=workers, batch_size=1)(
-        delayed(_rows)(folder, world, seed, list(methods), added, demonstrations)
-        for world, seed in jobs
+        delayed(_rows)(folder, world, seed, keys[world], added, demonstrations)
+        for seed in seeds
+        for world in worlds
     )
-    frame = pd.DataFrame([row for rows in done for row in rows])
-    order = {name: k for k, name in enumerate([*worlds, *methods])}
-    keys = {"key": lambda column: column.map(order) if column.name != "seed" else column}
-    return frame.sort_values(["world", "method", "seed"], ignore_index=True, **keys)
+    rows = {(row["world"], row["method"], row["seed"]): row for rows in done for row in rows}
+    return pd.DataFrame([rows[w, m, s] for w in worlds for m in methods for s in seeds])
 
 
 def _rows(
     folder: Path,
     world: str,
     seed: int,
-    methods: list[str],
+    keys: Mapping[str, str],
     added: tuple[Path, ...],
     demonstrations: int | None,
 ) -> list[dict[str, Any]]:
-    """The rows of one world and seed; those that are missing are computed and kept."""
-    return list(_each(folder, world, seed, methods, added, demonstrations))
-
-
-def _each(
-    folder: Path,
-    world: str,
-    seed: int,
-    methods: list[str],
-    added: tuple[Path, ...],
-    demonstrations: int | None,
-) -> Iterator[dict[str, Any]]:
-    """Row by row."""
+    """The rows of one world and seed, by methods and what their code is; kept ones are read."""
     catalog, case = load(added), None
     entry = catalog.worlds[world]
     count = demonstrations or entry.demonstrations
-    for name in methods:
-        method = catalog.methods[name]
-        key = f"{catalog.source(entry.make, method.answer)} {count}"
+    rows = []
+    for name, source in keys.items():
+        method, key = catalog.methods[name], f"{source} {count}"
         path = folder / _RUNS / world / name.replace(":", "") / f"{seed}.json"
         row = _kept(path, key)
         if row is None:
@@ -98,7 +92,8 @@ def _each(
             row |= {**score(case, answer, rng), "seconds": seconds}
             row = {k: None if v != v else v for k, v in row.items()}  # JSON has no nan
             replace_file(path, json_bytes({"key": key, "row": row}))
-        yield row
+        rows.append(row)
+    return rows
 
 
 def _warm_up(case: Case) -> None:

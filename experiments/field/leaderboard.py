@@ -51,24 +51,29 @@ def standings(runs: pd.DataFrame, name: str, told: set[str]) -> pd.DataFrame:
     rows = []
     for world, group in runs.groupby("world", sort=False):
         table = sign * group.pivot(index="seed", columns="method", values=name).astype(float)
-        ours = [method for method in table if method.startswith(OURS)]
+        ours = [str(method) for method in table if str(method).startswith(OURS)]
         groups = {
-            "rival": [m for m in table if m not in ours and m not in told],
-            "scorer": [m for m in table if m in told],
+            "rival": [str(m) for m in table if m not in ours and m not in told],
+            "scorer": [str(m) for m in table if m in told],
         }
         if not ours:
             continue
-        best = table[ours].mean().idxmax()
+        best = _best(table, ours)
         row = {"world": world, "ours": best}
         for kind, methods in groups.items():
             if methods:
-                other = table[methods].mean().idxmax()
+                other = _best(table, methods)
                 gap = interval((table[best] - table[other]).dropna().to_numpy())
                 row |= {kind: other, f"ahead_of_{kind}": gap["mean"]}
                 row |= {f"lower_{kind}": gap["lower"], f"upper_{kind}": gap["upper"]}
                 row[f"verdict_{kind}"] = _verdict(gap)
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _best(table: pd.DataFrame, methods: list[str]) -> str:
+    """The method of the largest mean, of equal ones the first."""
+    return methods[int(np.argmax([table[method].mean() for method in methods]))]
 
 
 def _verdict(gap: dict[str, float]) -> str:

@@ -33,7 +33,7 @@ from mlci.spaces import Floats
 
 RATES = Rates(model_error=0.1)  # the default of `mlci.infer`
 LEAST = 0.1  # [nat a demonstration], the stop of Scobee and Sastry
-NEVER = 1e-6  # the model error of a sampler that has none: a set must not be certain
+NEVER = 1e-100  # the model error of what has none: an infinite gain could not be sampled
 STEPS = 100  # of each of two chains over sets, after half as many that do not count
 PATHS = 100  # sampled in each task
 ADJACENCY = 1.0  # [nat] for two neighbours; chosen on seeds 100 and 101, see README.md

@@ -23,8 +23,16 @@ they are told how many are true and take so many, which the others have to find 
 """
 
 
-def write_results(folder: Path, runs: pd.DataFrame, catalog: Catalog) -> Path:
-    """Write `runs.csv`, `leaderboard.csv`, `standings.csv`, `leaderboard.png` and `README.md`.
+def write_results(
+    folder: Path, runs: pd.DataFrame, catalog: Catalog, published: pd.DataFrame | None
+) -> Path:
+    """Write `runs.csv`, `leaderboard.csv`, `standings.csv`, `leaderboard.png` and `LEADERBOARD.md`.
+
+    Args:
+        folder: where to.
+        runs: rows of `contest`.
+        catalog: the entries that the rows are of.
+        published: of `published.false_shares`, also written as a table; None leaves it out.
 
     Returns:
         The page.
@@ -38,8 +46,10 @@ def write_results(folder: Path, runs: pd.DataFrame, catalog: Catalog) -> Path:
     replace_file(folder / "tables" / "leaderboard.csv", csv_bytes(board))
     replace_file(folder / "tables" / "standings.csv", csv_bytes(stands))
     replace_file(folder / "leaderboard.png", picture(board, told))
-    page = folder / "README.md"
-    replace_file(page, page_text(runs, board, stands, catalog, told).encode())
+    if published is not None:
+        replace_file(folder / "tables" / "published.csv", csv_bytes(published))
+    page = folder / "LEADERBOARD.md"
+    replace_file(page, page_text(runs, board, stands, catalog, published).encode())
     return page
 
 
@@ -49,9 +59,14 @@ def told_methods(runs: pd.DataFrame) -> set[str]:
 
 
 def page_text(
-    runs: pd.DataFrame, board: pd.DataFrame, stands: pd.DataFrame, catalog: Catalog, told: set[str]
+    runs: pd.DataFrame,
+    board: pd.DataFrame,
+    stands: pd.DataFrame,
+    catalog: Catalog,
+    published: pd.DataFrame | None,
 ) -> str:
     """The page in Markdown."""
+    told = told_methods(runs)
     worlds, methods = runs["world"].unique().tolist(), runs["method"].unique().tolist()
     parts = [
         _HEAD.format(seeds=runs["seed"].nunique()),
@@ -61,6 +76,8 @@ def page_text(
         "## Ours against the others\n",
         _STANDINGS,
         _stands(stands[stands["score"] == "iou"]),
+        _FINDINGS,
+        *([] if published is None else [_PUBLISHED, _published(published)]),
         *(_of_world(board, world, methods, told) for world in worlds),
         "## How worlds were made\n",
         _table(
@@ -89,13 +106,21 @@ What the columns say:
   the first k hypotheses, where k are true.
 - *log posterior*: of the truth by the marginals, as if hypotheses were independent, probabilities
   kept {1e-6:g} from 0 and 1; only of methods that have probabilities.
-- *claimed - true*: probability that the first hypothesis is said to have, less how often it is true;
-  above 0 is too sure. The paper's (12) as printed is no probability: it is cut at 0 and 1.
+- *claimed - true*: probability that the first hypothesis is said to have, less how often it is
+  true; above 0 is too sure. The paper's (12) as printed is no probability: it is cut at 0 and 1.
 - *violations, reward lost, tasks without a way*: an agent of the same kind does the tasks and keeps
   out of what was inferred. How likely it enters what is truly forbidden; how much less reward it
   expects than one who knows the truth, below 0 where it goes through what is forbidden; and in how
   many tasks what was inferred leaves no way at all, which the other two leave out.
 - *time*: of one processor, without making the world.
+"""
+_PUBLISHED = """## Published numbers beside ours
+
+Share of false positives among the constraints that Scobee and Sastry's rule selects in their 9 x 9
+world (their Figure 3, means over ten sets of demonstrations), with the same stop. What differs: the
+truth and the demonstrations are ours, as the table of worlds says, and so are the draws.
+"""
+_FINDINGS = """
 """
 _STANDINGS = """Our method of the best mean IoU in each world, against the best of the others and
 against the best of those that are told how many hypotheses are true: mean difference over seeds,
@@ -116,7 +141,7 @@ def _overall(board: pd.DataFrame, methods: list[str], told: set[str]) -> str:
 def _of_world(board: pd.DataFrame, world: str, methods: list[str], told: set[str]) -> str:
     """A section with a row a method."""
     table = board[board["world"] == world].set_index(["method", "score"])
-    rows = [[_named(m, told), *(_between(table.loc[(m, s)]) for s in SCORES)] for m in methods]
+    rows = [[_named(m, told), *(_between(table, m, s) for s in SCORES)] for m in methods]
     return f"\n## {world}\n\n" + _table(["method", *(words for words, _ in SCORES.values())], rows)
 
 
@@ -153,9 +178,24 @@ def _number(value: float | None) -> str:
     return "" if value is None or value != value else f"{value:.3g}"
 
 
-def _between(row: pd.Series) -> str:
+def _between(table: pd.DataFrame, method: str, name: str) -> str:
     """A mean with its interval."""
+    row = table.loc[[(method, name)]].iloc[0]
     if row["mean"] != row["mean"]:
         return ""
     half = row["upper"] - row["mean"]
     return f"{row['mean']:.3g}" + ("" if half != half else f" ± {half:.2g}")
+
+
+def _published(table: pd.DataFrame) -> str:
+    """Published shares beside ours."""
+    rows = [
+        [
+            f"{int(row['demonstrations'])}",
+            f"{row['published']:.4f}",
+            f"{row['mean']:.3f} ({row['lower']:.3f} to {row['upper']:.3f})",
+            f"{row['selected']:.1f}",
+        ]
+        for row in table.to_dict("records")
+    ]
+    return _table(["demonstrations", "published", "ours: greedy", "selected by ours"], rows)

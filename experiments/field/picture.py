@@ -30,13 +30,14 @@ def picture(board: pd.DataFrame, told: set[str], name: str = "iou") -> bytes:
     worlds, methods = table["world"].unique().tolist(), table["method"].unique().tolist()
     means = table.pivot(index="world", columns="method", values="mean").loc[worlds, methods]
     ends = table.pivot(index="world", columns="method", values="upper").loc[worlds, methods]
+    middle, upper = means.to_numpy(dtype=float), ends.to_numpy(dtype=float)
     with plt.rc_context({"font.size": 7}):
         size = _WIDTH, _HEAD + _ROW * len(worlds)
         figure, axes = plt.subplots(figsize=size, layout="constrained")
-        image = axes.imshow(means.to_numpy(), cmap="YlGnBu", vmin=0, vmax=1, aspect="auto")
+        image = axes.imshow(middle, cmap="YlGnBu", vmin=0, vmax=1, aspect="auto")
         for i in range(len(worlds)):
             for j in range(len(methods)):
-                mean, end = means.iat[i, j], ends.iat[i, j]
+                mean, end = middle[i, j], upper[i, j]
                 if mean != mean:
                     continue
                 half = f"\n± {end - mean:.2f}" if end == end else ""

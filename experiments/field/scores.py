@@ -39,13 +39,13 @@ def score(case: Case, answer: Answer, rng: np.random.Generator) -> dict[str, flo
     truth, count = case.truth, int(np.sum(case.truth))
     first = _first(answer.scores, count, rng)
     chosen = first if answer.chosen is None else answer.chosen
-    both = np.sum(np.minimum(chosen, case.cover))
-    either = np.sum(np.maximum(chosen, case.cover))
+    both = float(np.sum(case.cover[chosen]))
+    either = both + float(np.sum(1 - case.cover[chosen])) + float(np.sum(case.cover[~chosen]))
     rank = rank_scores(answer.scores, answer.scores > -np.inf)
     return {
-        "iou": float(both / either),
-        "precision": float(np.sum(case.cover[chosen]) / max(np.sum(chosen), 1)),
-        "recall": float(np.sum(case.cover[chosen]) / np.sum(case.cover)),
+        "iou": both / either if either else 1.0,
+        "precision": both / max(int(np.sum(chosen)), 1),
+        "recall": both / max(float(np.sum(case.cover)), SURE),
         "rank": float(np.min(rank[truth], initial=len(truth))),
         "top": float(np.sum(first & truth) / max(count, 1)),
         "log_posterior": _log_posterior(answer.probability, truth),
@@ -85,14 +85,16 @@ def _deployed(case: Case, chosen: Bools) -> dict[str, float]:
 
     Its reward is compared with that of an agent who knows which moves are forbidden.
     """
-    violations, lost, stuck = [], [], []
+    violations: list[float] = []
+    lost: list[float] = []
+    stuck: list[float] = []
     for agent, _ in case.problem.tasks:
         allowed = agent.table.allowed & ~case.forbidden.reshape(agent.table.reward.shape)
         best = replace(agent, table=replace(agent.table, allowed=allowed))
         inferred = agent.under(chosen)
         if not (best.is_possible and agent.is_possible):
             continue  # the table cannot do what the demonstrator did
-        stuck.append(not inferred.is_possible)
+        stuck.append(float(not inferred.is_possible))
         if inferred.is_possible:
             violations.append(1 - inferred.keeps_out(case.forbidden))
             lost.append(best.expected_reward - inferred.expected_reward)

@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # loads scipy.sparse when it is first used
 
 from mlci.rivals.problem import Problem
 from mlci.spaces import Bools, Floats, Ints
@@ -37,8 +38,12 @@ def crossings(problem: Problem, paths: int, rng: np.random.Generator) -> Floats:
     total = np.zeros(problem.regions)
     for agent, numbers in problem.tasks:
         if agent.is_possible:
-            crossed = [agent.table.crossed_by(path) for path in agent.sample(paths, rng)]
-            total += len(numbers) * np.mean(crossed, axis=0)
+            sampled = agent.sample(paths, rng)
+            rows = [p.states[:-1] * agent.table.actions + p.actions for p in sampled]
+            owner = np.repeat(np.arange(paths), [len(row) for row in rows])
+            moves = np.ones(len(owner)), (owner, np.concatenate(rows))
+            made = scipy.sparse.csr_matrix(moves, shape=(paths, agent.table.crosses.shape[0]))
+            total += len(numbers) * np.mean((made @ agent.table.crosses).toarray() > 0, axis=0)
     return total / len(problem.shown)
 
 
@@ -90,7 +95,7 @@ class _Places:
 
     def total(self, visits: Floats) -> Floats:
         """(P,) visits of the states (S,) of each place."""
-        return np.bincount(self.number, visits, minlength=len(self.inside))
+        return np.asarray(np.bincount(self.number, visits, len(self.inside)), dtype=float)
 
 
 def _agents(problem: Problem) -> Floats:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy  # loads scipy.sparse when it is first used
+from numpy.typing import ArrayLike
 
 from experiments.field.entries import Case
 from mlci.demonstrations import Demonstration
@@ -19,12 +20,17 @@ from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
 from mlci.rivals.agent import Agent
 from mlci.rivals.problem import Beside, Problem, Shown
-from mlci.spaces import Floats
+from mlci.spaces import Box, Floats
 from mlci.systems import System
 from mlci.tabular import TabularModel, action_grid, discretize
 from mlci.worlds.tables import Table, TableRegion
 
 _POINTS = 8  # along each axis of a hypothesis, of which those inside the truth are counted
+
+
+def box(lower: ArrayLike, upper: ArrayLike) -> Box:
+    """A box of lists of numbers."""
+    return Box(np.array(lower, dtype=float), np.array(upper, dtype=float))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from functools import cache, partial
 import numpy as np
 
 from experiments.field.entries import Case, World
-from experiments.field.worlds.continuous import Cells
-from mlci.demonstrator import Outcome, demonstrate, sample_trials
+from experiments.field.worlds.continuous import Cells, box
+from mlci.demonstrator import Attempt, Outcome, demonstrate, sample_trials
 from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.safety.constant_controls import tabulate_escapes
@@ -19,14 +19,14 @@ from mlci.systems import Pendulum, System, TelescopingPendulum
 
 HORIZON, PI, FREE = 5.0, np.pi, np.inf
 SWING, LEG = Pendulum(), TelescopingPendulum()
-C1 = Box([PI, 0.0], [1.2 * PI, 1.2])
-C2 = Box([1.6 * PI, 0.0], [1.8 * PI, 1.2])
-PAIN = Box([-0.3, -FREE, 7.2, -FREE], [0.3, FREE, 8.2, FREE])
+C1 = box([PI, 0.0], [1.2 * PI, 1.2])
+C2 = box([1.6 * PI, 0.0], [1.8 * PI, 1.2])
+PAIN = box([-0.3, -FREE, 7.2, -FREE], [0.3, FREE, 8.2, FREE])
 
 
-def cells(system: System, box: Box) -> Cells:
+def cells(system: System, forbidden: Box) -> Cells:
     """The table of one of the systems under a truth."""
-    truth = Regions.from_boxes(system.space, [box])
+    truth = Regions.from_boxes(system.space, [forbidden])
     if system is SWING:
         return Cells(system, truth, (20, 20), 9, 0.25, (10, 10))
     return Cells(system, truth, (10, 5, 10, 5), (5, 3), 1.0, (10, None, 10, None))
@@ -35,8 +35,8 @@ def cells(system: System, box: Box) -> Cells:
 @cache
 def safe_set(world: str) -> tuple[SafeSet, float]:
     """The states that can keep out of a truth, and the filter's margin."""
-    system, box, *_ = _WORLDS[world]
-    truth = Regions.from_boxes(system.space, [box])
+    system, forbidden, *_ = _WORLDS[world]
+    truth = Regions.from_boxes(system.space, [forbidden])
     if system is SWING:
         safe = solve_safe_set(system, Grid(system.space, (121, 121)), truth)
         return safe, border_margin(system, safe, 0.02)
@@ -50,11 +50,12 @@ def make(world: str, seed: int, count: int) -> Case:
     Raises:
         ValueError: fewer were kept than are to be shown.
     """
-    system, box, starts, offsets, restarts = _WORLDS[world]
+    system, forbidden, starts, offsets, restarts = _WORLDS[world]
     safe, margin = safe_set(world)
-    truth = Regions.from_boxes(system.space, [box])
+    truth = Regions.from_boxes(system.space, [forbidden])
     keep_out = SafetyFilter(system, safe, 0.02, margin)
-    kept, tried, batch = [], 0, 2 * count
+    kept: list[tuple[int, Attempt]] = []
+    tried, batch = 0, 2 * count
     while len(kept) < count:
         trials = sample_trials(
             system,
@@ -75,12 +76,14 @@ def make(world: str, seed: int, count: int) -> Case:
         if tried > 10 * count and not kept:
             raise ValueError(f"{world}: none of {tried} demonstrations was kept")
     last = kept[count - 1][0]
-    return cells(system, box).case([a.demonstration for _, a in kept[:count]], last + 1 - count)
+    return cells(system, forbidden).case(
+        [a.demonstration for _, a in kept[:count]], last + 1 - count
+    )
 
 
-_POSTURES = Box([-0.8, 0.0, 5.3, 0.0], [0.8, 0.0, 10.7, 0.0])
-_ANY_SPEED = Box([-0.1, -FREE, -0.3, -FREE], [0.1, FREE, 0.3, FREE])
-_ANYWHERE = Box([0.0, -2.0], [2 * PI, 2.0])
+_POSTURES = box([-0.8, 0.0, 5.3, 0.0], [0.8, 0.0, 10.7, 0.0])
+_ANY_SPEED = box([-0.1, -FREE, -0.3, -FREE], [0.1, FREE, 0.3, FREE])
+_ANYWHERE = box([0.0, -2.0], [2 * PI, 2.0])
 _WORLDS = {
     "pendulum C1": (SWING, C1, _ANYWHERE, None, 3),
     "pendulum C2": (SWING, C2, _ANYWHERE, None, 3),
@@ -98,8 +101,8 @@ WORLDS = {
         source=_SOURCE + f"Constraint Inference: section V, {name}; 20 x 20 cells, 9 actions, "
         "0.25 s, 100 hypotheses",
         setting=_SETTING.format(tasks="random safe states of at most 2 rad/s"),
-        differs="demonstrations by iLQR behind a safety filter of ours, with its margin; 20 of them "
-        "in place of 65",
+        differs="demonstrations by iLQR behind a safety filter of ours, with its margin; 20 of "
+        "them in place of 65",
     )
     for name in ("C1", "C2")
 } | {

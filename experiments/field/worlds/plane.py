@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.field.entries import Case, World
-from experiments.field.worlds.continuous import Cells
+from experiments.field.worlds.continuous import Cells, box
 from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, crossing, demonstrate, sample_trials
 from mlci.grids import Grid
@@ -14,7 +14,7 @@ from mlci.regions import Regions
 from mlci.safety.reachability import solve_safe_set
 from mlci.safety.safety_filter import SafetyFilter
 from mlci.shapes.balls import Ball
-from mlci.spaces import Box, Floats, StateSpace
+from mlci.spaces import Floats, StateSpace
 from mlci.systems import FunctionSystem
 
 POINT = PlanarPoint()
@@ -25,8 +25,8 @@ ELLIPSES = Regions.from_shapes(
 )
 BETWEEN = Cells(POINT, ELLIPSES, (24, 24), 5, 0.5, (12, 12), temperature=0.1)
 
-SQUARE = StateSpace(Box([0.0, 0.0], [1.0, 1.0]), [False, False], ("x", "y"), ("m", "m"))
-HAND = FunctionSystem(lambda x, u: (u[..., 0], u[..., 1]), SQUARE, Box([-1.0, -1.0], [1.0, 1.0]))
+SQUARE = StateSpace(box([0.0, 0.0], [1.0, 1.0]), np.zeros(2, dtype=bool), ("x", "y"), ("m", "m"))
+HAND = FunctionSystem(lambda x, u: (u[..., 0], u[..., 1]), SQUARE, box([-1.0, -1.0], [1.0, 1.0]))
 CENTER, RADIUS = np.array([0.5, 0.5]), 0.1
 DISC = Regions.from_shapes(SQUARE, [Ball(CENTER, [RADIUS, RADIUS])], ("disc",))
 # The straightest path strays by sqrt(0.02 * 2 / 8) = 0.07 m halfway: most of a hypothesis.
@@ -64,7 +64,8 @@ def between(seed: int, count: int) -> Case:
 
 def around(seed: int, count: int) -> Case:
     """Paths that people might take round the disc, whose way across it would be the shortest."""
-    rng, kept, dropped = np.random.default_rng(seed), [], 0
+    rng, dropped = np.random.default_rng(seed), 0
+    kept: list[Demonstration] = []
     while len(kept) < count:
         path = reach(rng)
         if DISC.violated_by(path)[0] or not np.all((path > 0) & (path < 1)):
@@ -114,7 +115,7 @@ WORLDS = {
         make=between,
         demonstrations=16,
         source="our own, of the kind that work on continuous constraints demonstrates with",
-        setting="tasks of 5 s; a point in a plane that moves as it is told, temperature 0.1, reward "
+        setting="tasks of 5 s; a point that moves as it is told, temperature 0.1, reward "
         "minus the squared speed, no discount; hard: no state inside; 24 x 24 cells, 25 actions, "
         "0.5 s, 144 hypotheses",
         differs="tasks are those whose straight way would enter an ellipse",
