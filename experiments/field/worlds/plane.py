@@ -23,14 +23,14 @@ ELLIPSES = Regions.from_shapes(
     [Ball([-1.0, 0.6], [0.9, 0.6]), Ball([1.1, -0.7], [0.6, 1.0])],
     ("wide", "high"),
 )
-BETWEEN = Cells(POINT, ELLIPSES, (24, 24), 5, 0.5, (12, 12), temperature=0.1)
+BETWEEN = Cells(POINT, ELLIPSES, (24, 24), 7, 0.5, (12, 12), temperature=0.1)
 
 SQUARE = StateSpace(box([0.0, 0.0], [1.0, 1.0]), np.zeros(2, dtype=bool), ("x", "y"), ("m", "m"))
 HAND = FunctionSystem(lambda x, u: (u[..., 0], u[..., 1]), SQUARE, box([-1.0, -1.0], [1.0, 1.0]))
 CENTER, RADIUS = np.array([0.5, 0.5]), 0.1
 DISC = Regions.from_shapes(SQUARE, [Ball(CENTER, [RADIUS, RADIUS])], ("disc",))
 # The straightest path strays by sqrt(0.02 * 2 / 8) = 0.07 m halfway: most of a hypothesis.
-ROUND = Cells(HAND, DISC, (20, 20), 5, 0.2, (10, 10), temperature=0.02)
+ROUND = Cells(HAND, DISC, (20, 20), 7, 0.2, (10, 10), temperature=0.02)
 
 DURATION, SAMPLE = 2.0, 0.02  # [s] of a reach, and between samples
 NOISE, CLEARANCE = 0.15, 0.04  # deviation of a velocity as a share of it, [m] kept on average
@@ -116,7 +116,7 @@ WORLDS = {
         demonstrations=16,
         source="our own, of the kind that work on continuous constraints demonstrates with",
         setting="tasks of 5 s; a point that moves as it is told, temperature 0.1, reward "
-        "minus the squared speed, no discount; hard: no state inside; 24 x 24 cells, 25 actions, "
+        "minus the squared speed, no discount; hard: no state inside; 24 x 24 cells, 49 actions, "
         "0.5 s, 144 hypotheses",
         differs="tasks are those whose straight way would enter an ellipse",
     ),
@@ -127,7 +127,7 @@ WORLDS = {
         "radius 0.1 in the unit square; movements after Flash and Hogan 1985, noise after Harris "
         "and Wolpert 1998",
         setting="reaches of 2 s; temperature 0.02, reward minus the squared speed, no discount; "
-        "hard: no state inside; 20 x 20 cells, 25 actions, 0.2 s, 100 hypotheses, none of which "
+        "hard: no state inside; 20 x 20 cells, 49 actions, 0.2 s, 100 hypotheses, none of which "
         "lies in the disc as a whole",
         differs="paths are simulated by our own rule, and those that enter the disc are made anew",
     ),

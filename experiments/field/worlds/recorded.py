@@ -48,7 +48,7 @@ def world(folder: Path) -> World:
         source=str(settings["source"]),
         setting=f"a point in a plane that moves as it is told, temperature "
         f"{settings['temperature']}, reward minus the squared speed, no discount; hard: no state "
-        f"inside; 20 x 20 cells, 25 actions, {settings['dt']} s, 100 hypotheses",
+        f"inside; 20 x 20 cells, 49 actions, {settings['dt']} s, 100 hypotheses",
         differs="a seed shows some of the recordings, drawn without replacement",
     )
 
@@ -85,7 +85,7 @@ def _recorded(folder: Path) -> tuple[Cells, list[Demonstration]]:
         raise ValueError(f"{folder} has no readable recordings: {'; '.join(map(str, problems))}")
     truth = Regions.from_shapes(space, shapes)
     times = float(settings["dt"]), float(settings["temperature"])
-    return Cells(system, truth, (20, 20), 5, times[0], (10, 10), times[1]), paths
+    return Cells(system, truth, (20, 20), 7, times[0], (10, 10), times[1]), paths
 
 
 def _settings(folder: Path) -> dict[str, Any]:

@@ -15,8 +15,9 @@ from experiments.field.contest import contest
 from experiments.field.entries import Answer
 from experiments.field.leaderboard import interval, standings
 from experiments.field.scores import SCORES, score
-from experiments.field.worlds import mazes, scobee, walls
+from experiments.field.worlds import mazes, plane, scobee, walls
 from experiments.field.worlds.grids import MOVES, slippery, successors
+from mlci.rivals.set_gains import single_avoidance
 
 README = Path(__file__).parents[3] / "experiments" / "field" / "README.md"
 QUICK = ["ours: single", "paper as printed", "visitation difference", "middle"]
@@ -162,6 +163,14 @@ def test_every_truth_has_a_way_round_and_matters() -> None:
         assert agent.under(case.truth).keeps_out(case.forbidden) == pytest.approx(1)
         assert agent.keeps_out(case.forbidden) < 0.5
         assert not case.problem.violated[:, case.truth].any()
+
+
+def test_the_cells_of_a_continuous_world_can_do_what_people_did() -> None:
+    case = plane.WORLDS["disc"].make(0, 4)
+    assert all(agent.is_possible for agent, _ in case.problem.tasks)
+    assert np.sum(case.cover) == pytest.approx(np.pi, rel=0.05)  # in hypotheses of 0.1 x 0.1
+    alpha = single_avoidance(case.problem)
+    assert np.min(alpha[:, case.truth]) < 0.5
 
 
 def test_intervals_and_standings_by_hand() -> None:
