@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -86,14 +85,16 @@ def chosen(known: Sequence[str], names: Sequence[str] | None, what: str) -> list
 
 
 def _imported(path: Path) -> ModuleType:
-    """The module of a file."""
-    name = f"field_entry_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None or not path.is_file():
+    """The module of a file, as it is now: none that was compiled before, and none left behind.
+
+    Raises:
+        ValueError: no such file.
+    """
+    if not path.is_file():
         raise ValueError(f"{path} is no Python file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
+    module = ModuleType(f"field_entry_{path.stem}")
+    sys.modules[module.__name__] = module  # dataclasses of the file look for it
+    exec(compile(path.read_text(), str(path), "exec"), vars(module))
     return module
 
 

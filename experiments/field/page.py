@@ -129,12 +129,12 @@ _FINDINGS = """Where ours is behind, as far as we found out why:
   forbidden does too. An agent that is deployed does not tell the difference: compare violations.
 - *Few paths, and a prior that expects little.* One demonstration of the continuous worlds brings a
   fraction of a nat to any one hypothesis. Where 20 random tasks hardly come by the truth, as under
-  C2, `ours: single` ranks the truth first and still says that there is more likely none. What is told
-  that exactly one is true just takes the first.
+  C2, `ours: single` ranks the truth first and still says that there is more likely none. What is
+  told that exactly one is true just takes the first.
 - *One task, shown many times.* In the mazes all demonstrations have one start and goal. A few
-  forbidden states explain all that they avoid, and which of several equal explanations is true they do
-  not tell; chains over sets then mix badly. Selection, one region after the other, takes the one of
-  the largest share, which need not be in the truth.
+  forbidden states explain all that they avoid, and which of several equal explanations is true
+  they do not tell; chains over sets then mix badly. Selection, one region after the other, takes
+  the one of the largest share, which need not be in the truth.
 - *The model is the truth* in the grids: their demonstrators are the agents that likelihoods assume.
   In the pendulums, the ellipses and the disc they are not.
 """
