@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from mlci.planar_point import PlanarPoint
 
 from experiments.field.entries import Case, World
 from experiments.field.worlds.continuous import Cells, box
 from mlci.demonstrations import Demonstration
 from mlci.demonstrator import Outcome, crossing, demonstrate, sample_trials
 from mlci.grids import Grid
-from mlci.planar_point import PlanarPoint
 from mlci.regions import Regions
 from mlci.safety.reachability import solve_safe_set
 from mlci.safety.safety_filter import SafetyFilter
