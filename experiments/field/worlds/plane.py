@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from mlci.planar_point import PlanarPoint
 
 from experiments.field.entries import Case, World
 from experiments.field.worlds.continuous import Cells, box
@@ -16,6 +15,7 @@ from mlci.safety.safety_filter import SafetyFilter
 from mlci.shapes.balls import Ball
 from mlci.spaces import Floats, StateSpace
 from mlci.systems import FunctionSystem
+from mlci.zoo.planar_point import PlanarPoint
 
 POINT = PlanarPoint()
 ELLIPSES = Regions.from_shapes(
