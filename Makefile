@@ -19,7 +19,7 @@ HALF := $(shell echo $$(( ($$(getconf _NPROCESSORS_ONLN) + 1) / 2 )))
 # Each line of a study with its name, as another one runs beside it.
 SAY = (trap "" INT; awk "{ print \"$*: \" \$$0; fflush() }")
 
-.PHONY: help install paper studies figures report smoke test stress lint benchmark lock
+.PHONY: help install paper studies field figures report smoke test stress lint benchmark lock
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -42,6 +42,9 @@ studies: $(READY) ## run what is missing of all other studies, and draw their fi
 	done
 	@$(BIN)/python -m experiments.success_rule
 
+field: $(READY) ## run the benchmark of methods and worlds: results/field/LEADERBOARD.md
+	$(BIN)/python -m experiments.field
+
 figures: $(READY) ## draw all figures and write the report again, from the tables alone
 	$(BIN)/python -m paper_figures
 	@$(MAKE) --no-print-directory report
@@ -53,6 +56,8 @@ smoke: $(READY) ## run, draw and report every study, tiny, in results/smoke
 	@$(MAKE) --no-print-directory --jobs=2 $(patsubst %,smoke-%,$(STUDIES) $(OTHERS))
 	$(BIN)/python -m paper_figures --results results/smoke $(STUDIES) $(OTHERS)
 	$(BIN)/python -m paper_figures.report --results results/smoke
+	$(BIN)/python -m experiments.field --seeds 1 --demonstrations 3 --workers 1 --out results/smoke/field \
+		--worlds "walls S3" "pendulum C1" "maze 3"
 
 # One worker each: to start another takes longer than its share of such points.
 smoke-%: $(READY)

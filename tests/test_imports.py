@@ -21,6 +21,7 @@ MLCI = {
     "mlci.areas": "",
     "mlci.control": "",
     "mlci.mechanics": "",
+    "mlci.rivals": "",
     "mlci.safety": "",
     "mlci.sampled": "",
     "mlci.sets": "",
@@ -105,6 +106,12 @@ MLCI = {
     "mlci.areas.overlap": "mlci.spaces",
     "mlci.areas.evidence": "mlci.misfit mlci.evidence",
     "mlci.areas.belief": "mlci.areas.evidence mlci.areas.overlap mlci.credible_sets",
+    "mlci.rivals.agent": "mlci.worlds.tables",
+    "mlci.rivals.problem": "mlci.rivals.agent",
+    "mlci.rivals.set_gains": "mlci.rivals.problem mlci.sets.evidence",
+    "mlci.rivals.traces": "mlci.rivals.problem",
+    "mlci.rivals.penalty_map": "mlci.rivals.problem",
+    "mlci.rivals.printed": "mlci.rivals.problem mlci.worlds.fixed_horizon",
     "mlci.diagnosis": "mlci.tabular",
     "mlci.end_moves": "mlci.tabular",
     "mlci.recursions": "mlci.compiled mlci.tabular",
@@ -187,6 +194,7 @@ ROOMS = {
     "experiments.sweep": f"{POINT} experiments.terminal experiments.point experiments.collate",
     "experiments.lookback": f"mlci {TRACKING} experiments.collate experiments.config.paths "
     "experiments.config.suggestions experiments.terminal",
+    "experiments.field": f"mlci {TRACKING} experiments.config.paths",
     "experiments.page": "mlci experiments.belief_lines experiments.console experiments.terminal",
     "experiments.page.of_point": f"{POINT} experiments.console experiments.point experiments.page "
     "experiments.lookback",

@@ -27,6 +27,7 @@ from sybil.parsers.markdown import CodeBlockParser
 
 import mlci
 from experiments import advise, infer, results, run
+from experiments.field import __main__ as field
 from mlci.simulate import rollout
 from mlci.systems import Pendulum
 from paper_figures import __main__ as figures
@@ -65,6 +66,7 @@ MAINS = {
     "experiments/infer.py": infer.main,
     "experiments/advise.py": advise.main,
     "experiments/results.py": results.main,
+    "experiments.field": field.main,
     "paper_figures": figures.main,
     "paper_figures.report": report.main,
 }

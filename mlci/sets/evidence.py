@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +27,24 @@ from mlci.spaces import Bools, Floats
 
 # From a mask (C,) of regions, log alpha (C,) of avoiding all of them and each.
 Beside = Callable[[Bools], Floats]
+
+
+class SetGains(Protocol):
+    """The gain of sets of C hypotheses [nat]."""
+
+    @property
+    def regions(self) -> int:
+        """C."""
+
+    @property
+    def feasible(self) -> Bools:
+        """(C,) regions that may be in a set whose gain is not -inf."""
+
+    def beside(self, members: Bools) -> Floats:
+        """(C,) gain of a set, a mask (C,), together with each region; of a member, its own."""
+
+    def gain(self, members: Bools) -> float:
+        """The gain of a set."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,13 +19,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mlci.sets.chains import ChainCheck
-from mlci.sets.evidence import SetEvidence
+from mlci.sets.evidence import SetGains
 from mlci.sets.posterior import SetPosterior, SetPrior
 from mlci.spaces import Bools, Floats
 
 
 def sample_sets(
-    evidence: SetEvidence,
+    evidence: SetGains,
     prior: SetPrior,
     rng: np.random.Generator,
     *,
@@ -98,7 +98,7 @@ class _Beside:
 class _Weights:
     """log w of sets, remembered."""
 
-    evidence: SetEvidence
+    evidence: SetGains
     prior: SetPrior
     known: dict[bytes, _Beside] = field(default_factory=dict)
 

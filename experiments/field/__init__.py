@@ -1,0 +1,1 @@
+"""A benchmark of the field: methods that infer constraints, where these are known."""

@@ -1,0 +1,1 @@
+"""The worlds of the benchmark, each written anew from its published description."""

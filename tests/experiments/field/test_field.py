@@ -1,0 +1,186 @@
+"""The benchmark end to end with the README's own world and method, its scores and its worlds."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.field.__main__ import main
+from experiments.field.catalog import load
+from experiments.field.contest import contest
+from experiments.field.entries import Answer
+from experiments.field.leaderboard import interval, standings
+from experiments.field.scores import SCORES, score
+from experiments.field.worlds import mazes, plane, scobee, walls
+from experiments.field.worlds.grids import MOVES, slippery, successors
+from mlci.rivals.set_gains import single_avoidance
+
+README = Path(__file__).parents[3] / "experiments" / "field" / "README.md"
+QUICK = ["ours: single", "paper as printed", "visitation difference", "middle"]
+
+
+@pytest.fixture(scope="module")
+def mine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of the README's example."""
+    path = tmp_path_factory.mktemp("field") / "mine.py"
+    path.write_text(re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)[0])
+    return path
+
+
+def without_time(table: Path) -> pd.DataFrame:
+    """A table of runs but for what a clock says."""
+    return pd.read_csv(table).drop(columns="seconds")
+
+
+def test_the_example_of_the_readme_is_short_and_leads_to_a_leaderboard(
+    mine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert len(mine.read_text().splitlines()) < 60
+    folder = tmp_path / "a"
+    arguments = ["--add", str(mine), "--worlds", "row", "--seeds", "2", "--workers", "1"]
+    assert main([*arguments, "--methods", *QUICK, "--out", str(folder)]) == 0
+    assert str(folder / "LEADERBOARD.md") in capsys.readouterr().out
+    page = (folder / "LEADERBOARD.md").read_text()
+    assert "| row | mine | 6 moves | nothing is published |" in page
+    assert (folder / "leaderboard.png").read_bytes().startswith(b"\x89PNG")
+    board = pd.read_csv(folder / "tables" / "leaderboard.csv").set_index(["method", "score"])
+    assert board.loc[("middle", "iou"), "mean"] == 1  # the middle one is forbidden
+    assert board.loc[("ours: single", "rank"), "mean"] == 1
+
+    # What is done is not done again, and one method more is done alone; order does not matter.
+    kept = {path: path.stat().st_mtime_ns for path in folder.rglob("*.json")}
+    assert main([*arguments, "--methods", *QUICK, "uniform", "--out", str(folder)]) == 0
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    assert len(list(folder.rglob("*.json"))) == len(kept) + 2
+    other = tmp_path / "b"
+    assert main([*arguments, "--methods", "uniform", *QUICK, "--out", str(other)]) == 0
+    first, second = (without_time(where / "tables" / "runs.csv") for where in (folder, other))
+    pd.testing.assert_frame_equal(first, second)
+
+
+def test_changed_code_is_run_again(mine: Path, tmp_path: Path) -> None:
+    added = tmp_path / "changed.py"
+    for forbidden, iou in (("[3]", 1.0), ("[2]", 0.0)):  # the middle one, and its neighbour
+        added.write_text(mine.read_text().replace("[3]", forbidden))
+        load.cache_clear()
+        runs = contest(tmp_path, ["row"], ["middle"], [0], (added,))
+        assert runs["iou"].tolist() == [iou]
+
+
+def test_mistakes_are_told(mine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    empty = tmp_path / "empty.py"
+    empty.write_text("")
+    (tmp_path / "folder").mkdir()
+    for arguments, message in (
+        (["--worlds", "moon"], "no world is called moon"),
+        (["--methods", "luck"], "no method is called luck"),
+        (["--add", str(empty)], "neither WORLDS nor METHODS"),
+        (["--add", str(tmp_path / "none.py")], "no Python file"),
+        (["--add", str(mine), str(mine)], "is there already"),
+        (["--add", str(tmp_path / "folder")], "world.yaml"),
+    ):
+        assert main([*arguments, "--out", str(tmp_path / "r")]) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_recordings_of_a_folder_are_a_world(tmp_path: Path) -> None:
+    lines = ["lower: [0, 0]", "upper: [1, 1]", "speed: 1", "dt: 0.2", "temperature: 0.02"]
+    lines += ["source: drawn by hand", "forbidden: [{center: [0.5, 0.5], radii: [0.1, 0.1]}]"]
+    (tmp_path / "world.yaml").write_text("\n".join(lines))
+    time = np.linspace(0, 1, 21)
+    for name, bend in (("up", 0.25), ("down", -0.25)):
+        y = 0.5 + bend * np.sin(np.pi * time)
+        frame = pd.DataFrame({"time": time, "x": 0.1 + 0.8 * time, "y": y})
+        frame.to_csv(tmp_path / f"{name}.csv", index=False)
+    world = load((tmp_path,)).worlds[f"recorded: {tmp_path.name}"]
+    case = world.make(0, 20)
+    assert len(case.problem.shown) == 2
+    assert np.flatnonzero(case.cover > 0.1).tolist() == [44, 45, 54, 55]
+    assert not case.problem.violated[:, case.cover > 0.1].any()
+    up, down = (each.violated for each in case.problem.shown)  # across y = 0.75 or 0.25 halfway
+    assert {bool(up[57]), bool(down[57])} == {bool(up[52]), bool(down[52])} == {False, True}
+
+
+def test_scores_by_hand() -> None:
+    case = walls.WORLDS["walls S3"].make(1, 3)
+    truth = case.truth
+    assert np.flatnonzero(truth).tolist() == [21, 22, 23, 24, 25]
+    rng = np.random.default_rng(0)
+    half = truth & (np.arange(49) < 23)  # two of five
+    probability = np.where(half, 0.9, np.where(truth, 0.5, 0.1))
+    answer = Answer(np.where(half, 2.0, truth * 1.0), half | (np.arange(49) == 0), probability)
+    scores = score(case, answer, rng)
+    assert scores["iou"] == pytest.approx(2 / 6)
+    assert scores["precision"] == pytest.approx(2 / 3)
+    assert scores["recall"] == pytest.approx(2 / 5)
+    assert scores["rank"] == 1.5  # two share the first rank
+    assert scores["top"] == 1
+    log_posterior = 46 * np.log(0.9) + 3 * np.log(0.5)
+    assert scores["log_posterior"] == pytest.approx(log_posterior)
+    assert scores["calibration"] == pytest.approx(-0.1)
+    knows = score(case, Answer(truth.astype(float), truth), rng)
+    assert knows["violations"] == pytest.approx(0, abs=1e-12)
+    assert knows["reward_lost"] == pytest.approx(0, abs=1e-9)
+    ignores = score(case, Answer(truth.astype(float), np.zeros(49, dtype=bool)), rng)
+    assert ignores["violations"] > 0.9
+    assert ignores["reward_lost"] < -1  # the way through the wall is shorter
+    blocked = score(case, Answer(truth.astype(float), ~np.eye(49, dtype=bool)[0]), rng)
+    assert blocked["stuck"] == 1
+    assert np.isnan(blocked["reward_lost"])
+    assert SCORES.keys() == scores.keys() | {"seconds"}
+
+
+def test_what_only_scores_takes_as_many_as_are_true_with_ties_at_random() -> None:
+    case = walls.WORLDS["walls S3"].make(1, 3)
+    flat = [score(case, Answer(np.zeros(49)), np.random.default_rng(k)) for k in range(40)]
+    share = [each["precision"] for each in flat]
+    assert np.mean(share) == pytest.approx(5 / 49, abs=4 * np.std(share) / np.sqrt(40))
+    assert {each["precision"] == each["recall"] for each in flat} == {True}
+
+
+def test_slips_are_as_published() -> None:
+    meant = successors((7, 7))
+    chances = slippery(meant, 0.05)
+    inner = 3 * 7 + 3
+    assert sorted(chances[inner, 0][chances[inner, 0] > 0]) == pytest.approx(
+        [0.05 / 8] * 7 + [0.95 + 0.05 / 8]
+    )
+    corner = chances[0][meant[0] >= 0]  # three moves stay on the grid
+    left = 0.95 + 3 * 0.05 / 8
+    assert corner.max(axis=1) == pytest.approx([(0.95 + 0.05 / 8) / left] * 3)
+    assert np.sum(chances, axis=2)[meant < 0].tolist() == [0] * int(np.sum(meant < 0))
+    assert len(MOVES) == 8
+
+
+def test_every_truth_has_a_way_round_and_matters() -> None:
+    for world in (*walls.WORLDS.values(), *mazes.WORLDS.values(), *scobee.WORLDS.values()):
+        case = world.make(0, 1)
+        ((agent, _),) = case.problem.tasks
+        assert agent.under(case.truth).keeps_out(case.forbidden) == pytest.approx(1)
+        assert agent.keeps_out(case.forbidden) < 0.5
+        assert not case.problem.violated[:, case.truth].any()
+
+
+def test_the_cells_of_a_continuous_world_can_do_what_people_did() -> None:
+    case = plane.WORLDS["disc"].make(0, 4)
+    assert all(agent.is_possible for agent, _ in case.problem.tasks)
+    assert np.sum(case.cover) == pytest.approx(np.pi, rel=0.05)  # in hypotheses of 0.1 x 0.1
+    alpha = single_avoidance(case.problem)
+    assert np.min(alpha[:, case.truth]) < 0.5
+
+
+def test_intervals_and_standings_by_hand() -> None:
+    assert interval(np.array([1.0, 2.0, 3.0]))["upper"] == pytest.approx(2 + 4.302653 / np.sqrt(3))
+    rows = [
+        {"world": "w", "method": method, "seed": seed, "iou": iou + 0.01 * seed}
+        for method, iou in (("ours: a", 0.5), ("other", 0.3), ("told", 0.6))
+        for seed in range(3)
+    ]
+    (row,) = standings(pd.DataFrame(rows), "iou", {"told"}).to_dict("records")
+    assert (row["ours"], row["rival"], row["scorer"]) == ("ours: a", "other", "told")
+    assert row["ahead_of_rival"] == pytest.approx(0.2)
+    assert (row["verdict_rival"], row["verdict_scorer"]) == ("ahead", "behind")
