@@ -35,7 +35,8 @@ from paper_figures.report import (
     section_evidence,
     section_start_points,
 )
-from paper_figures.report.document import SECTIONS, report
+from paper_figures.report.chapters import SECTIONS
+from paper_figures.report.document import report
 from paper_figures.report.means import Mean, share
 from paper_figures.report.study_tables import Missing, Results
 from paper_figures.report.verdict import Check, Claim, Part, Verdict
