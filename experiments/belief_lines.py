@@ -21,10 +21,10 @@ _AREAS, _MARGINALS = 3, 5  # that are printed
 class Beliefs:
     """Beliefs beside that over single regions; each None where nobody asked."""
 
-    names: Sequence[str]  # of the hypotheses
-    sets: SetPosterior | None
-    controls: ControlInference | None
-    area: AreaBelief | None
+    names: Sequence[str] = ()  # of the hypotheses
+    sets: SetPosterior | None = None
+    controls: ControlInference | None = None
+    area: AreaBelief | None = None
 
 
 def belief_lines(beliefs: Beliefs, top: int) -> Iterator[str]:

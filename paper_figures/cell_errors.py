@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.rows import Unsuited
-from paper_figures.style import GUIDE, PAGE, RC, new_figure
+from paper_figures.style import GUIDE, PAGE, RC, SIX_COLOURS, SIX_MARKS, new_figure
 
 TABLES = {
     "resolution": (
@@ -17,14 +17,14 @@ TABLES = {
     ),
 }
 
-# In order of the legend: what a kind of cells is called, its colour and its mark.
+# What each kind of cells is called, in order of the legend.
 KINDS = {
-    "centre": ("equal, from centres", "#7f7f7f", "s"),
-    "averaged": ("equal, averaged", "#56b4e9", "o"),
-    "multilinear": ("equal, multilinear", "#cc79a7", "D"),
-    "round goals": ("equal, goals in the middle", "#009e73", "v"),
-    "varying": ("varying", "#d55e00", "^"),
-    "of each task": ("varying, for each task alone", "#000000", "*"),
+    "centre": "equal, from centres",
+    "averaged": "equal, averaged",
+    "multilinear": "equal, multilinear",
+    "round goals": "equal, goals in the middle",
+    "varying": "varying",
+    "of each task": "varying, for each task alone",
 }
 PANELS = {"error": "against sampled paths", "error_of_cells": "against very many equal cells"}
 _REPLICATES = 1000  # of tasks, for intervals
@@ -85,7 +85,8 @@ def draw(resolution: pd.DataFrame) -> Figure:
     figure, panels = new_figure(PAGE, 3.0, ncols=len(PANELS), sharey=True)
     with plt.rc_context(RC):
         for axes, (reference, title) in zip(panels, PANELS.items(), strict=True):
-            for kind, (label, colour, mark) in KINDS.items():
+            looks = zip(KINDS.items(), SIX_COLOURS, SIX_MARKS, strict=True)
+            for (kind, label), colour, mark in looks:
                 some = rows[(rows["reference"] == reference) & (rows["kind"] == kind)]
                 some = some[some["possible"] == some["tasks"]]
                 axes.errorbar(
@@ -128,7 +129,7 @@ def facts(resolution: pd.DataFrame) -> str:
             .itertuples(index=False)
         )
         lines.append(
-            f"  {PANELS[reference]}, {KINDS[kind][0]}: {errors} cells; error falls with number to "
+            f"  {PANELS[reference]}, {KINDS[kind]}: {errors} cells; error falls with number to "
             f"the power of {order:.2f}"
         )
     return "\n".join(lines)

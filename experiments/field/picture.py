@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-
 import matplotlib
 
 matplotlib.use("agg")
@@ -12,8 +10,8 @@ import matplotlib.pyplot as plt
 import pandas as pd
 
 from experiments.field.scores import SCORES
+from mlci.plot import png
 
-_DPI = 200
 _WIDTH, _ROW, _HEAD = 7.4, 0.33, 1.9  # in
 _DARK = 0.55  # above which numbers are white
 
@@ -51,7 +49,6 @@ def picture(board: pd.DataFrame, told: set[str], name: str = "iou") -> bytes:
         axes.spines[:].set_visible(False)
         axes.set_xlabel("† is told how many hypotheses are true")
         figure.colorbar(image, label=f"{SCORES[name][0]}, mean over seeds", pad=0.01)
-        buffer = io.BytesIO()
-        figure.savefig(buffer, dpi=_DPI, metadata={"Software": None})
+        content = png(axes)
         plt.close(figure)
-    return buffer.getvalue()
+    return content

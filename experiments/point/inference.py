@@ -53,8 +53,8 @@ class PointInference:
     truth: Bools
     inference: Inference
     diagnosis: Diagnosis | None
-    calibration: Calibration | None
-    beliefs: Beliefs
+    calibration: Calibration | None = None
+    beliefs: Beliefs = Beliefs()
 
     @property
     def tabular(self) -> TabularModel:

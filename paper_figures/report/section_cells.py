@@ -49,8 +49,8 @@ def _target(rows: pd.DataFrame) -> str:
             many, few = near.loc[near["error"].idxmin()], varying.loc[varying["error"].idxmin()]
             verdict = "met" if few["error"] <= many["error"] else "missed"
             lines.append(
-                f"- {title}: {few['count']:.0f} cells, {KINDS[kind][0]}, err by {_error(few)}, "
-                f"{many['count']:.0f} cells, {KINDS[many['kind']][0]}, by {_error(many)}; the "
+                f"- {title}: {few['count']:.0f} cells, {KINDS[kind]}, err by {_error(few)}, "
+                f"{many['count']:.0f} cells, {KINDS[many['kind']]}, by {_error(many)}; the "
                 f"target, no larger an error, is {verdict}."
             )
     return "\n".join(lines)
@@ -59,7 +59,7 @@ def _target(rows: pd.DataFrame) -> str:
 def _table(rows: pd.DataFrame) -> str:
     """A line a kind, a column a number of cells that was asked for."""
     lines, levels = [], max(len(some) for _, some in rows.groupby("kind"))
-    for kind, (label, _, _) in KINDS.items():
+    for kind, label in KINDS.items():
         some = rows[rows["kind"] == kind].sort_values("count")
         each = [f"{row['count']:.0f}: {_error(row)}" for _, row in some.iterrows()]
         order = slope(some)

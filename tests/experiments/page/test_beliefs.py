@@ -43,7 +43,7 @@ def test_sets_are_told_as_their_most_probable_one_and_their_regions() -> None:
     assert two[0].endswith("the likeliest answer is regions a, c together: 50.0 of 100.")
     assert one[1].endswith("region a: 80.0 of 100; region c: 30.0 of 100; region b: 0 of 100.")
     assert len(one) == 2
-    assert belief_sentences(Beliefs(NAMES, None, None, None)) == []
+    assert belief_sentences(Beliefs(NAMES)) == []
 
 
 def test_sampled_sets_say_whether_their_chains_agree() -> None:

@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 import pytest
-from mlci.planar_point import PlanarPoint
 
 from mlci.areas.belief import infer_area
 from mlci.areas.evidence import ShapeEvidence, points_met, sample_paths
@@ -21,6 +20,7 @@ from mlci.shapes.balls import Ball
 from mlci.spaces import Box, StateSpace
 from mlci.systems import Pendulum
 from mlci.tabular import action_grid, discretize
+from mlci.zoo.planar_point import PlanarPoint
 
 POINT = PlanarPoint(position_limit=1.5, speed_limit=1.0)
 GRID = Grid(POINT.space, (6, 6))  # cells of 0.5 m, and moves of none or one along each axis
