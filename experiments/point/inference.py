@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class PointInference:
     inference: Inference
     diagnosis: Diagnosis | None
     calibration: Calibration | None = None
-    beliefs: Beliefs = Beliefs()
+    beliefs: Beliefs = field(default_factory=Beliefs)
 
     @property
     def tabular(self) -> TabularModel:
