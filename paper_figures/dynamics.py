@@ -61,7 +61,7 @@ def draw(
             [name.replace(" alone", "\nalone") for name in WAYS.values()],
             *(ways[f"brier{end}"] for end in _ENDS),
         )
-        middle.set_xlabel("Brier score,\nsystems left out")
+        middle.set_xlabel("Brier score,\nsystems left out [1]")
         middle.set_xlim(left=0)
         weights = success_rule[success_rule["feature"] != "intercept"]
         names = [FEATURES[name].replace(" ", "\n", 1) for name in weights["feature"]]
@@ -69,7 +69,7 @@ def draw(
             right.set_yticks([])
         _rows(right, names, *(weights[f"weight{end}"] for end in _ENDS))
         right.axvline(0, color=GUIDE, linewidth=0.6)
-        right.set_xlabel("log odds of success\nby standard deviation")
+        right.set_xlabel("weight by standard\ndeviation [log odds]")
     return figure
 
 
@@ -109,7 +109,7 @@ def _by_system(axes: Axes, forecasts: pd.DataFrame) -> None:
     axes.set_yticks(numbers, labels=list(rows.index))
     axes.invert_yaxis()
     axes.set_xlim(-3, 103)
-    axes.set_xlabel("truth in the top 5 [%],\nafter 9 demonstrations")
+    axes.set_xlabel("truth in the top 5 after\n9 demonstrations [%]")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 

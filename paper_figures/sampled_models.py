@@ -99,7 +99,7 @@ def draw(models: pd.DataFrame, halving: pd.DataFrame, rank_curve: pd.DataFrame) 
             row[0].set_ylim(0.9, 100)
             row[0].set_yticks(_TICKS, labels=list(map(str, _TICKS)))
             row[0].yaxis.set_minor_locator(NullLocator())
-            row[0].set_ylabel("rank of truth, median")
+            row[0].set_ylabel("rank of truth")
             row[1].set_ylim(0, 103)
             row[1].set_ylabel(f"in the top {share.rpartition('_')[2]} [%]")
         _draw_changes(grid[0][2], change_rows(halving))
@@ -142,7 +142,7 @@ def _draw_changes(axes: Axes, rows: pd.DataFrame) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("$\\Delta t$ [s]")
-    axes.set_ylabel("change of $\\Phi$")
+    axes.set_ylabel("change of $\\Phi$ [probability]")
 
 
 def _draw_scores(axes: Axes, models: pd.DataFrame) -> None:
@@ -156,7 +156,7 @@ def _draw_scores(axes: Axes, models: pd.DataFrame) -> None:
     axes.set_xticks(range(len(names)), labels=names)
     axes.set_xlim(-0.5, len(names) - 0.5)
     axes.set_ylim(bottom=0)
-    axes.set_ylabel("Brier score of $\\Phi$")
+    axes.set_ylabel("Brier score of $\\Phi$ [1]")
 
 
 def facts(models: pd.DataFrame, halving: pd.DataFrame, rank_curve: pd.DataFrame) -> str:
@@ -164,7 +164,7 @@ def facts(models: pd.DataFrame, halving: pd.DataFrame, rank_curve: pd.DataFrame)
     share = _share(rank_curve)
     most = rank_curve["demonstrations"].max()
     lines = [
-        "The paper's pendulum with cells and sampled paths; dt 0.25 s, but for changes of Phi.",
+        "The paper's pendulum with cells and sampled paths; dt 0.25 s, but for changes of Phi; ranks are medians.",
         "Bands and bars: 95 % intervals by bootstrap, of ranks over seeds and subsets.",
         "Change of Phi: root mean square over tasks and regions, between a time step and the next",
         "shorter one, less the noise of samples. Brier score: forecasts of which regions simulated",

@@ -3,8 +3,16 @@
 import numpy as np
 import pandas as pd
 from constraint_studies import control_tables, resolution_tables, soft_tables, transfer_tables
+from dynamics_study import dynamics
 from figure_study import cell_boxes, dimension_rows, path_rows, region_rows
-from method_studies import baseline_differences, chosen_task_tables, early_overlap_tables
+from method_studies import (
+    baseline_differences,
+    chosen_task_tables,
+    early_overlap_tables,
+    sampled_tables,
+)
+
+from experiments.collate import success_rule
 
 LIMITS = ("", "_low", "_high")
 
@@ -303,6 +311,8 @@ def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
         "transfer": transfer_tables(),
         "control_limits": control_tables(),
         "cell_errors": resolution_tables(),
+        "sampled_models": sampled_tables(),
+        "dynamics": success_rule.success_tables(dynamics()),
         "area_cover": area_cover_tables(),
         "baselines": {"baseline_differences": baseline_differences()},
         "chosen_tasks": chosen_task_tables(),

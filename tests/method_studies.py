@@ -1,4 +1,4 @@
-"""Tables of two studies that were never run: ways to rank regions, and ways to choose tasks."""
+"""Tables of studies that were never run: ways to rank, to choose tasks; sampled paths."""
 
 import numpy as np
 import pandas as pd
@@ -65,3 +65,40 @@ def early_overlap_tables() -> dict[str, pd.DataFrame]:
     ]
     table = pd.DataFrame(rows)
     return {"early_overlap": early_overlap(table), "chosen_tasks": chosen_tasks(table)}
+
+
+def sampled_tables() -> dict[str, pd.DataFrame]:
+    """With paths the change goes with the step, beside noise; with cells it goes with its root."""
+    opening = [
+        {"truth": truth, "cells": cells, "seed": 0} for truth in ("c1", "c2") for cells in (0, 400)
+    ]
+    halving = [
+        {
+            **each,
+            "step": step,
+            "shorter": step / 2,
+            "trial": trial,
+            "change": (0.1 * step ** (0.5 if each["cells"] else 1)) ** 2 + noise,
+            "noise": noise,
+        }
+        for each in opening
+        for noise in [0.0 if each["cells"] else 0.003]
+        for step in (1.0, 0.5, 0.25)
+        for trial in range(3)
+    ]
+    scores = {"brier": 0.02, "brier_low": 0.01, "brier_high": 0.03, "off_by": 0.001}
+    scores |= {"log_score": -0.1, "log_score_low": -0.2, "log_score_high": -0.05}
+    ranks = {"rank": 1.0, "rank_lowest": 1.0, "rank_highest": 2.0, "settled": 3, "doubted": 1}
+    curve = {"median": 3.0, "median_low": 2.0, "median_high": 5.0}
+    curve |= {"share_top_5": 0.8, "share_top_5_low": 0.7, "share_top_5_high": 0.9}
+    return {
+        "models": pd.DataFrame([{**each, **scores, **ranks} for each in opening]),
+        "halving": pd.DataFrame(halving),
+        "rank_curve": pd.DataFrame(
+            [
+                {"truth": each["truth"], "cells": each["cells"], "demonstrations": count, **curve}
+                for each in opening
+                for count in (5, 9, 12)
+            ]
+        ),
+    }

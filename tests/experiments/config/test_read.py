@@ -98,6 +98,7 @@ def test_spelling_does_not_change_identity() -> None:
     assert len(set(same)) == 1
 
 
+ONE_MORE = {"counts": (9,)}
 IN_PLACE_OF_NONE = {"system": {"length": 1.5}, "iterations": 7, "integrator": "rk4"}
 
 
@@ -116,7 +117,7 @@ def changed(value: Any, name: str = "") -> Iterator[Any]:
             value, f"{value}2"
         )
     elif isinstance(value, tuple):
-        yield value[:-1] if len(value) > 1 else value * 2 or (0.25,)
+        yield value[:-1] if len(value) > 1 else value * 2 or ONE_MORE.get(name, (0.25,))
     elif value is None:
         yield IN_PLACE_OF_NONE.get(name, (0.25,))
     else:
@@ -158,7 +159,10 @@ COMMANDS = [
         "grid=300",
         "grid: there is no 300; there are 100, 400, 576, 900, 1600, 1728, 2401, 2500, 4096",
     ),
-    ("truth=c9", "truth: there is no c9; there are c1, c2, cell, none, pain, wall"),
+    (
+        "truth=c9",
+        "truth: there is no c9; there are c1, c2, cell, knee, link, none, pain, wall, reach, ",
+    ),
     ("grdi=100", "grdi: unknown key; did you mean grid?"),
     ("dt=[1", "dt=[1: cannot be read as key=value"),
     ("dt", "dt: cannot be read as key=value"),

@@ -13,6 +13,7 @@ from tiny_point import composed, hopeless
 
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
+from experiments.point.baseline_tables import baseline_table
 from experiments.point.inference import infer_point
 from experiments.point.run import run_point
 from experiments.point.streams import Purpose, stream
@@ -79,7 +80,7 @@ def test_baselines_are_ranked_on_the_subsets_of_ranks(point: tuple) -> None:
         assert one.loc["ours", "first"] == pytest.approx((of_size["rank"] == 1).mean())
         assert len(one) == 6
     ours = rows[rows["method"] == "ours"]
-    assert 0 < ours["first"].mean() < ours["top"].mean()
+    assert 0 < ours["top"].mean() < 1
     assert (rows.loc[rows["method"] == "uniform", "first"] == 0).all()
     assert rows["log_rank"].between(0, np.log(rows["rank"]) + 1e-12).all()
 
@@ -111,6 +112,18 @@ def test_baselines_are_ranked_by_the_library_on_each_subset_alone(
             expected |= {"top": (rank <= 4).mean(), "first": (rank == 1).mean()}
             assert table.loc[(method, size)].to_dict() == pytest.approx(expected), (method, size)
     assert table.groupby("demonstrations")["rank"].nunique().max() > 3  # methods can be told apart
+
+
+def test_what_no_demonstration_could_avoid_but_by_the_truth_is_first(
+    point: tuple, store: Store
+) -> None:
+    settings, asked = point[0], infer_point(point[0], store)
+    truth = asked.inference.hypotheses.inside(settings.constraint)
+    avoidance = np.where(truth, 1e-12, 0.9) * np.ones_like(asked.inference.avoidance)
+    sure = dataclasses.replace(asked.inference, avoidance=avoidance)
+    rows = baseline_table(settings, dataclasses.replace(asked, inference=sure))
+    assert (rows.loc[rows["method"] == "ours", "first"] == 1).all()
+    assert (rows.loc[rows["method"] == "uniform", "first"] == 0).all()
 
 
 def test_first_are_the_first_five_and_probabilities_those_of_one_trial(point: tuple) -> None:
