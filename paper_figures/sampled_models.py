@@ -164,8 +164,8 @@ def facts(models: pd.DataFrame, halving: pd.DataFrame, rank_curve: pd.DataFrame)
     share = _share(rank_curve)
     most = rank_curve["demonstrations"].max()
     lines = [
-        "The paper's pendulum with cells and sampled paths: median rank of the truth, its share among",
-        "the first; dt is 0.25 s, but for changes of Phi.",
+        "The paper's pendulum with cells and sampled paths: median rank of the truth, and how",
+        "often it is among the first; dt is 0.25 s, but for changes of Phi.",
         "Bands and bars: 95 % intervals by bootstrap, of ranks over seeds and subsets.",
         "Change of Phi: root mean square over tasks and regions, between a time step and the next",
         "shorter one, less the noise of samples. Brier score: forecasts of which regions simulated",
