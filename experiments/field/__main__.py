@@ -9,6 +9,7 @@ from pathlib import Path
 from experiments.config.paths import default_results
 from experiments.field.catalog import chosen, load
 from experiments.field.contest import contest
+from experiments.field.entries import EntryError
 from experiments.field.page import write_results
 from experiments.field.published import false_shares
 
@@ -22,6 +23,10 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if min(options.seeds, options.demonstrations or 1) < 1:
         parser.error("--seeds and --demonstrations are at least 1")
+    if options.workers == 0:
+        parser.error("--workers is a number of processes, or -1 for one a core; not 0")
+    if options.out.exists() and not options.out.is_dir():
+        parser.error(f"--out is a folder of results; {options.out} is a file")
     added = tuple(path.resolve() for path in options.add)
     try:
         catalog = load(added)
@@ -33,7 +38,11 @@ def main(arguments: list[str] | None = None) -> int:
     print(f"{len(worlds)} worlds, {len(methods)} methods, {options.seeds} seeds", flush=True)
     seeds = range(options.seeds)
     shown = options.demonstrations
-    runs = contest(options.out, worlds, methods, seeds, added, options.workers, shown)
+    try:
+        runs = contest(options.out, worlds, methods, seeds, added, options.workers, shown)
+    except EntryError as error:
+        print(error, file=sys.stderr)
+        return 2
     published = false_shares(seeds) if {*worlds, *methods} >= _PUBLISHED else None
     print(write_results(options.out, runs, catalog, published))
     return 0

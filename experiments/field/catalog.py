@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+import traceback
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from experiments.field.entries import Method, World
 from experiments.field.methods import METHODS
@@ -24,7 +26,7 @@ class Catalog:
         worlds: the worlds.
         methods: the methods.
         added: digests of the files that were added, and of what they use of this project, by the
-            name of their module.
+            name of their module; those of folders by their path.
     """
 
     worlds: dict[str, World]
@@ -35,6 +37,8 @@ class Catalog:
         """A hash of the code that some functions run."""
         modules = {_module(function) for function in functions}
         files = [self.added[name] for name in sorted(modules & self.added.keys())]
+        parts = [str(part) for each in functions for part in getattr(each, "args", ())]
+        files += [self.added[name] for name in sorted(self.added.keys() & set(parts))]
         own = sorted(modules - self.added.keys() | {"experiments.field.scores"})
         return digest("".join([source_hash(own), *files]).encode())
 
@@ -47,7 +51,8 @@ def load(added: tuple[Path, ...] = ()) -> Catalog:
     `METHODS` or both: dictionaries from names to `World` and `Method`.
 
     Raises:
-        ValueError: a file without either, or a name that is there already.
+        ValueError: a file that fails or has neither, an entry that is none, or a name that is there
+            already.
     """
     worlds = {
         name: world
@@ -58,19 +63,53 @@ def load(added: tuple[Path, ...] = ()) -> Catalog:
     digests = {}
     for path in added:
         if path.is_dir():
-            worlds[f"recorded: {path.name}"] = recorded.world(path)
+            _add(path, worlds, {f"recorded: {path.name}": recorded.world(path)}, World)
+            digests[str(path)] = _digest_of_folder(path)
             continue
         module = _imported(path)
         more = getattr(module, "WORLDS", {}), getattr(module, "METHODS", {})
         if not any(more):
             raise ValueError(f"{path} has neither WORLDS nor METHODS: see experiments/field/README")
-        for known, new in zip((worlds, methods), more, strict=True):
-            if twice := known.keys() & new.keys():
-                raise ValueError(f"{path}: {', '.join(sorted(twice))} is there already: rename it")
-            known.update(new)
+        _add(path, worlds, more[0], World)
+        _add(path, methods, more[1], Method)
         file = digest(read_file(path.resolve()))
         digests[module.__name__] = f"{file} {source_hash(_of_this_project(module))}"
     return Catalog(worlds, methods, digests)
+
+
+def _add(path: Path, known: dict[str, Any], more: object, kind: type) -> None:
+    """Add the entries of a file or folder to those that are known by name.
+
+    Raises:
+        ValueError: something that is no entry, or a name that is none or there already.
+    """
+    what = f"{path}: {kind.__name__.upper()}S"
+    if not isinstance(more, Mapping):
+        raise ValueError(f"{what} must be a dictionary by names, not a {type(more).__name__}")
+    taken = {_folder_name(name): name for name in known}
+    for name, entry in more.items():
+        if not isinstance(entry, kind):
+            raise ValueError(
+                f"{what}[{name!r}] must be a {kind.__name__}, not a {type(entry).__name__}"
+            )
+        if not isinstance(name, str) or not name.strip(". ") or set(name) & set("/\\\0"):
+            raise ValueError(f"{what}: {name!r} names no folder of results: rename it")
+        if _folder_name(name) in taken:
+            raise ValueError(f"{path}: {taken[_folder_name(name)]} is there already: rename it")
+        taken[_folder_name(name)] = name
+        known[name] = entry
+
+
+def _folder_name(name: str) -> str:
+    """What of a name distinguishes folders of results."""
+    return name.replace(":", "")
+
+
+def _digest_of_folder(folder: Path) -> str:
+    """Of all that its files hold."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    held = [f"{path.relative_to(folder)} {digest(read_file(path))}" for path in files]
+    return digest("\n".join(held).encode())
 
 
 def chosen(known: Sequence[str], names: Sequence[str] | None, what: str) -> list[str]:
@@ -88,13 +127,24 @@ def _imported(path: Path) -> ModuleType:
     """The module of a file, as it is now: none that was compiled before, and none left behind.
 
     Raises:
-        ValueError: no such file.
+        ValueError: no such file, or one that fails.
     """
     if not path.is_file():
         raise ValueError(f"{path} is no Python file")
-    module = ModuleType(f"field_entry_{path.stem}")
+    # Two files may have one name.
+    module = ModuleType(f"field_entry_{digest(str(path.resolve()).encode())[:8]}_{path.stem}")
     sys.modules[module.__name__] = module  # dataclasses of the file look for it
-    exec(compile(path.read_text(), str(path), "exec"), vars(module))
+    try:
+        exec(compile(path.read_text("utf-8"), str(path), "exec"), vars(module))
+    except (Exception, SystemExit) as error:  # it may be anybody's file
+        del sys.modules[module.__name__]
+        lines = [
+            each.lineno
+            for each in traceback.extract_tb(error.__traceback__)
+            if each.filename == str(path)
+        ]
+        where = f", line {lines[-1]}" if lines else ""
+        raise ValueError(f"{path}{where} fails: {type(error).__name__}: {error}") from error
     return module
 
 

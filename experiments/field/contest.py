@@ -14,7 +14,7 @@ import pandas as pd
 from joblib import Parallel, delayed
 
 from experiments.field.catalog import load
-from experiments.field.entries import Case
+from experiments.field.entries import Case, EntryError, check_answer
 from experiments.field.scores import score
 from experiments.tracking.files import json_bytes, read_file, replace_file
 from mlci.rivals.set_gains import set_gains
@@ -44,6 +44,9 @@ def contest(
         added: files with more worlds or methods.
         workers: processes.
         demonstrations: how many each world shows; None is what the world says.
+
+    Raises:
+        EntryError: a world or a method that does not give what it must.
     """
     catalog = load(added)  # code is read once: what changes meanwhile does not run either
     keys = {
@@ -82,11 +85,17 @@ def _rows(
         if row is None:
             if case is None:
                 case = entry.make(seed, count)
+                if not isinstance(case, Case):
+                    raise EntryError(f"world {world} must make a Case, not {type(case).__name__}")
                 _warm_up(case)
             rng = np.random.default_rng([seed, crc32(world.encode()), crc32(name.encode())])
             begin = time.process_time()
             answer = method.answer(case.problem, rng)
             seconds = time.process_time() - begin
+            try:
+                check_answer(answer, case.problem.regions)
+            except EntryError as error:
+                raise EntryError(f"method {name} in world {world}, seed {seed}: {error}") from None
             row = {"world": world, "method": name, "seed": seed, "demonstrations": count}
             row |= {"told": answer.chosen is None, "dropped": case.dropped}
             row |= {**score(case, answer, rng), "seconds": seconds}

@@ -11,6 +11,10 @@ from mlci.rivals.problem import Problem
 from mlci.spaces import Bools, Floats
 
 
+class EntryError(ValueError):
+    """A world or a method that is not as it must be; the message says which, and in what."""
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """A world with demonstrations, and what is true in it.
@@ -83,3 +87,31 @@ class Method:
     answer: Callable[[Problem, np.random.Generator], Answer]
     source: str
     differs: str = "nothing"
+
+
+def check_answer(answer: object, regions: int) -> None:
+    """Whether an answer says of each hypothesis what it must.
+
+    Raises:
+        EntryError: something else, arrays of other shapes, or NaN.
+    """
+    if not isinstance(answer, Answer):
+        raise EntryError(f"it must return an Answer, not a {type(answer).__name__}")
+    for name in ("scores", "chosen", "probability"):
+        found = getattr(answer, name)
+        if found is None and name != "scores":
+            continue
+        array = np.asarray(found)
+        kinds, meant = ("b", "truth values") if name == "chosen" else ("bif", "numbers")
+        if array.shape != (regions,) or array.dtype.kind not in kinds:
+            raise EntryError(
+                f"its {name} must be {meant}, one of each of {regions} hypotheses, not "
+                f"{array.dtype} of shape {array.shape}"
+            )
+        if np.isnan(array).any():
+            raise EntryError(f"its {name} are NaN for hypothesis {int(np.argmax(np.isnan(array)))}")
+    outside = answer.probability is not None and not np.all(
+        (np.asarray(answer.probability) >= -1e-9) & (np.asarray(answer.probability) <= 1 + 1e-9)
+    )
+    if outside or not 0 <= (0 if answer.claimed is None else answer.claimed) <= 1 + 1e-9:
+        raise EntryError("its probabilities must lie between 0 and 1")

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from experiments.field.entries import Case, World
+from experiments.field.entries import Case, EntryError, World
 from experiments.field.worlds.continuous import Cells, box
 from experiments.tracking.files import read_file
 from mlci.demonstrations import Demonstration
@@ -69,6 +69,20 @@ def make(folder: Path, seed: int, count: int) -> Case:
 def _recorded(folder: Path) -> tuple[Cells, list[Demonstration]]:
     """The table and all recordings."""
     settings = _settings(folder)
+    system, truth = _plane(settings)
+    paths, problems, _ = read_demonstrations(folder, system)
+    if not paths:
+        raise EntryError(f"{folder} has no readable recordings: {'; '.join(map(str, problems))}")
+    times = float(settings["dt"]), float(settings["temperature"])
+    return Cells(system, truth, (20, 20), 7, times[0], (10, 10), times[1]), paths
+
+
+def _plane(settings: dict[str, Any]) -> tuple[FunctionSystem, Regions]:
+    """The system and the truth.
+
+    Raises:
+        ValueError, TypeError, KeyError: an entry that describes none.
+    """
     space = StateSpace(
         box(settings["lower"], settings["upper"]), np.zeros(2, dtype=bool), ("x", "y"), ("m", "m")
     )
@@ -80,12 +94,7 @@ def _recorded(folder: Path) -> tuple[Cells, list[Demonstration]]:
         else box(each["lower"], each["upper"])
         for each in settings["forbidden"]
     ]
-    paths, problems, _ = read_demonstrations(folder, system)
-    if not paths:
-        raise ValueError(f"{folder} has no readable recordings: {'; '.join(map(str, problems))}")
-    truth = Regions.from_shapes(space, shapes)
-    times = float(settings["dt"]), float(settings["temperature"])
-    return Cells(system, truth, (20, 20), 7, times[0], (10, 10), times[1]), paths
+    return system, Regions.from_shapes(space, shapes)
 
 
 def _settings(folder: Path) -> dict[str, Any]:
@@ -97,4 +106,15 @@ def _settings(folder: Path) -> dict[str, Any]:
         raise ValueError(f"{path} cannot be read: {error}") from None
     if not isinstance(settings, dict) or settings.keys() != _SETTINGS:
         raise ValueError(f"{path} needs the entries {', '.join(sorted(_SETTINGS))}, and no others")
+    for name in ("speed", "dt", "temperature"):
+        number = settings[name]
+        if not isinstance(number, int | float) or not 0 < number < np.inf:
+            raise ValueError(f"{path}: {name} must be a number above 0, not {number!r}")
+    try:
+        _plane(settings)
+    except (ValueError, TypeError, KeyError) as error:
+        raise ValueError(
+            f"{path}: lower and upper are two corners, and forbidden is a list of "
+            "{center, radii} or {lower, upper}: " + f"{type(error).__name__}: {error}"
+        ) from error
     return settings

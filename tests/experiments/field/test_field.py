@@ -184,3 +184,94 @@ def test_intervals_and_standings_by_hand() -> None:
     assert (row["ours"], row["rival"], row["scorer"]) == ("ours: a", "other", "told")
     assert row["ahead_of_rival"] == pytest.approx(0.2)
     assert (row["verdict_rival"], row["verdict_scorer"]) == ("ahead", "behind")
+
+
+def test_files_that_are_no_entries_are_told(tmp_path: Path) -> None:
+    entry = "from experiments.field.entries import Method\nMETHODS = {{{!r}: Method(None, '')}}"
+    for text, message in (
+        ("def f(:", "SyntaxError"),
+        ("x = 1\nraise KeyError('boom')", "line 2 fails: KeyError: 'boom'"),
+        ("import sys; sys.exit(0)", "SystemExit"),
+        ("WORLDS = [1]", "WORLDS must be a dictionary by names, not a list"),
+        ("WORLDS = {'odd': 3}", "WORLDS['odd'] must be a World, not a int"),
+        (entry.format("a/../b"), "names no folder of results"),
+        (entry.format("ours greedy"), "ours: greedy is there already"),
+    ):
+        path = tmp_path / "entry.py"
+        path.write_text(text)
+        load.cache_clear()
+        with pytest.raises(ValueError, match=re.escape(message)):
+            load((path,))
+    path.write_bytes(b"\xff\xfe")
+    load.cache_clear()
+    with pytest.raises(ValueError, match=r"entry\.py fails: UnicodeDecodeError"):
+        load((path,))
+
+
+def test_files_of_one_name_are_told_apart(mine: Path, tmp_path: Path) -> None:
+    paths = []
+    for word in ("left", "right"):
+        path = tmp_path / word / "entry.py"
+        path.parent.mkdir()
+        path.write_text(mine.read_text().replace('"row"', f'"{word}"').replace("middle", word))
+        paths.append(path)
+    catalog = load(tuple(paths))
+    assert len(catalog.added) == 2
+    assert catalog.worlds["left"].make(0, 2).cover.shape == (7,)
+    sources = {catalog.source(catalog.methods[word].answer) for word in ("left", "right")}
+    assert len(sources) == 2
+
+
+def test_changed_recordings_are_run_again_and_folders_of_one_name_are_refused(
+    tmp_path: Path,
+) -> None:
+    lines = ["lower: [0, 0]", "upper: [1, 1]", "speed: 1", "dt: 0.2", "temperature: 0.02"]
+    lines += ["source: nobody", "forbidden: []"]
+    folders = [tmp_path / word / "lab" for word in ("a", "b")]
+    for folder in folders:
+        folder.mkdir(parents=True)
+        (folder / "world.yaml").write_text("\n".join(lines))
+    with pytest.raises(ValueError, match="recorded: lab is there already"):
+        load(tuple(folders))
+    sources = set()
+    for text in ("time,x,y\n0,0,0\n1,1,1\n", "time,x,y\n0,0,0\n1,0.5,1\n"):
+        (folders[0] / "path.csv").write_text(text)
+        load.cache_clear()
+        catalog = load((folders[0],))
+        sources.add(catalog.source(catalog.worlds["recorded: lab"].make))
+    assert len(sources) == 2
+    for old, new, message in (
+        ("speed: 1", "speed: fast", "speed must be a number above 0, not 'fast'"),
+        ("temperature: 0.02", "temperature: .nan", "temperature must be a number above 0"),
+        ("forbidden: []", "forbidden: [{centre: [0, 0]}]", "{center, radii} or {lower, upper}"),
+        ("lower: [0, 0]", "lower: [0]", "two corners"),
+    ):
+        (folders[0] / "world.yaml").write_text("\n".join(lines).replace(old, new))
+        load.cache_clear()
+        with pytest.raises(ValueError, match=re.escape(message)):
+            load((folders[0],))
+
+
+def test_answers_that_say_nothing_are_refused(
+    mine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, scores = mine.read_text(), "Answer(scores, chosen=scores == scores.max())"
+    assert scores in text
+    for answer, message in (
+        ("Answer(scores * np.nan)", "its scores are NaN for hypothesis 0"),
+        ("Answer(scores[1:])", "its scores must be numbers, one of each of 7 hypotheses"),
+        ("Answer(scores, chosen=[3])", "its chosen must be truth values"),
+        ("Answer(scores, probability=scores)", "between 0 and 1"),
+        ("scores", "it must return an Answer, not a ndarray"),
+    ):
+        path = tmp_path / "answers.py"
+        path.write_text(text.replace(scores, answer))
+        load.cache_clear()
+        arguments = ["--add", str(path), "--worlds", "row", "--methods", "middle", "--seeds", "1"]
+        assert main([*arguments, "--workers", "1", "--out", str(tmp_path / "r")]) == 2
+        told = capsys.readouterr().err
+        assert "method middle in world row, seed 0" in told
+        assert message in told
+    for wrong in (["--workers", "0"], ["--out", str(path)]):
+        with pytest.raises(SystemExit):
+            main(wrong)
