@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mlci.cells.refinement import refine
+from mlci.cells.refinement import check_cells, refine
 from mlci.demonstrations import Task
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
@@ -24,17 +24,14 @@ class RefinedModel:
         cells: how many each task has.
 
     Raises:
-        ValueError: fewer cells than there are.
+        ValueError, TypeError: as of `check_cells`.
     """
 
     model: TabularModel
     cells: int
 
     def __post_init__(self) -> None:
-        if self.cells < self.model.states:
-            raise ValueError(
-                f"there are {self.model.states} cells already: ask for more than {self.cells}"
-            )
+        check_cells(self.model, self.cells)
 
     @property
     def regions(self) -> Regions:

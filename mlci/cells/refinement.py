@@ -39,18 +39,15 @@ def refine(
         progress: called with how many cells there are, and how many there shall be.
 
     Raises:
-        ValueError: no task, fewer cells than there are, a growth outside (0, 1], or a task that
-            the model cannot describe.
+        ValueError: no task, a number of cells that is not whole or less than there are, a growth
+            outside (0, 1], or a task that the model cannot describe.
         TypeError: a model that has more than cells and start points, such as a multilinear one.
     """
-    if type(model) is not TabularModel:
-        raise TypeError(f"cells of a TabularModel are refined, not of a {type(model).__name__}")
+    check_cells(model, cells)
     if not tasks:
         raise ValueError("cells are refined for tasks: there is none")
     if not 0 < growth <= 1:
         raise ValueError(f"the share of cells that are halved lies in (0, 1], not {growth}")
-    if cells < model.states:
-        raise ValueError(f"there are {model.states} cells already: ask for more than {cells}")
     tree = _first_tree(model, tasks, cells)
     points = [task.goal.lower for task in tasks if np.all(task.goal.widths == 0)]
     while True:
@@ -76,6 +73,21 @@ def refine(
         along = np.full(tree.size, LEAF)
         along[halved] = np.argmax(matters[halved], axis=1)
         tree = tree.halved(along)
+
+
+def check_cells(model: TabularModel, cells: int) -> None:
+    """Whether a model can be refined to so many cells.
+
+    Raises:
+        ValueError: a number that is not whole, or less than there are.
+        TypeError: another model than a `TabularModel`.
+    """
+    if type(model) is not TabularModel:
+        raise TypeError(f"cells of a TabularModel are refined, not of a {type(model).__name__}")
+    if not isinstance(cells, int | np.integer):
+        raise ValueError(f"a number of cells is whole, not {cells!r}")
+    if cells < model.states:
+        raise ValueError(f"there are {model.states} cells already: ask for more than {cells}")
 
 
 def _first_tree(model: TabularModel, tasks: Sequence[Task], cells: int) -> BoxTree:

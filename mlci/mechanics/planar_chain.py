@@ -40,8 +40,8 @@ class PlanarChain(System):
         joints: (L,) names; joint_1 and so on if it is empty.
 
     Raises:
-        ValueError: lists of other lengths, a number that must be positive and is not, or a joint
-            whose range is empty or more than a turn.
+        ValueError: lists of other lengths, a number that must be positive and is not, names that
+            are not different, or a joint whose range is empty or more than a turn.
     """
 
     lengths: tuple[float, ...]
@@ -62,7 +62,7 @@ class PlanarChain(System):
         links = len(self.lengths)
         if not links:
             raise ValueError("a PlanarChain needs at least one link")
-        for name in (*_LISTS, *(name for name in _OPTIONAL if getattr(self, name))):
+        for name in (*_LISTS, *(name for name in _OPTIONAL if len(getattr(self, name)))):
             if len(getattr(self, name)) != links:
                 raise ValueError(
                     f"PlanarChain.{name} must have a value for each of {links} lengths, not "
@@ -78,6 +78,13 @@ class PlanarChain(System):
                 raise ValueError(f"PlanarChain.{name} must be at least 0: {getattr(self, name)}")
         if np.any(np.add(np.square(self.centers), self.inertias) == 0):
             raise ValueError("a link of a PlanarChain needs a centre or an inertia above 0")
+        if not np.isfinite(self.gravity):
+            raise ValueError(f"PlanarChain.gravity must be finite, not {self.gravity}")
+        if len({*self.joints, *(f"{name}_speed" for name in self.joints)}) < 2 * len(self.joints):
+            raise ValueError(
+                f"PlanarChain.joints must be different, and each from another's with _speed, not "
+                f"{self.joints}"
+            )
         widths = np.subtract(self.upper, self.lower)
         if not np.all((widths > 0) & (widths <= 2 * np.pi + 1e-9)):
             raise ValueError(

@@ -58,13 +58,18 @@ class JointBarrier(ControlFilter):
     margin: float = 0.02
 
     def __post_init__(self) -> None:
-        if not (self.dt > 0 and self.margin >= 0):
+        if not (0 < self.dt < np.inf and 0 <= self.margin < np.inf):
             raise ValueError(f"a barrier needs dt > 0 and margin >= 0: {self.dt}, {self.margin}")
         if len(self.braking) != self.chain.links or not np.all(np.array(self.braking) > 0):
             raise ValueError(
                 f"a barrier needs a positive deceleration of each joint, not {self.braking}"
             )
         links, space = self.chain.links, self.chain.space
+        if self.truth.space.dimension != space.dimension:
+            raise ValueError(
+                f"a barrier of a chain of {space.dimension} dimensions keeps out of regions of as "
+                f"many, not of {self.truth.space.dimension}"
+            )
         bounded = np.isfinite(self.truth.lower) | np.isfinite(self.truth.upper)
         if not np.all(self.truth.are_boxes) or np.any(bounded[:, links:]):
             raise ValueError("a barrier keeps out of boxes of joint angles at any rates alone")

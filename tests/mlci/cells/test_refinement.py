@@ -139,3 +139,8 @@ def test_what_cannot_be_refined_is_refused() -> None:
     shared = MultilinearModel(PENDULUM, GRID, mlci.action_grid(PENDULUM, 3), 0.25, HYPOTHESES)
     with pytest.raises(TypeError, match="not of a MultilinearModel"):
         refine(shared, TASKS, 250)
+    with pytest.raises(TypeError, match="not of a MultilinearModel"):
+        mlci.RefinedModel(shared, 250)
+    for cells in (np.nan, np.inf, 250.5):
+        with pytest.raises(ValueError, match="a number of cells is whole, not"):
+            refine(model(), TASKS, cells)

@@ -176,6 +176,9 @@ def test_a_straight_chain_is_as_steep_as_is_told(point):
         (dict(centers=(0.0, 0.1), inertias=(0.0, 0.1)), "a centre or an inertia above 0"),
         (dict(lower=(-2.0, 2.0)), "no more than a turn apart"),
         (dict(upper=(2.0, 9.0)), "no more than a turn apart"),
+        (dict(gravity=np.nan), "gravity must be finite"),
+        (dict(joints=("knee", "knee")), "joints must be different"),
+        (dict(joints=("knee", "knee_speed")), "joints must be different"),
     ],
 )
 def test_a_chain_that_cannot_be_is_refused(options, words):

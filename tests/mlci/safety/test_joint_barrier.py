@@ -10,6 +10,7 @@ from mlci.regions import Regions
 from mlci.safety.joint_barrier import JointBarrier
 from mlci.simulate import RK4
 from mlci.spaces import Box
+from mlci.systems import Pendulum
 
 ARM = PlanarChain(
     *((0.3, 0.25, 0.2), (2.0, 1.2, 0.5), (0.15, 0.1, 0.1), (0.02, 0.01, 0.002)),
@@ -110,6 +111,8 @@ def test_braking_takes_the_controls_that_it_says():
     ("change", "words"),
     [
         (dict(dt=0.0), "dt > 0"),
+        (dict(margin=np.inf), "margin >= 0"),
+        (dict(truth=Regions.from_grid(Pendulum().space, (2, 2))), "not of 2"),
         (dict(braking=(1.0, 1.0)), "positive deceleration of each joint"),
         (dict(truth=boxes([FREE, FREE, FREE, [0.0, 1.0]])), "joint angles at any rates"),
         (dict(truth=boxes([FREE, FREE, FREE])), "bounds no joint"),
