@@ -22,6 +22,7 @@ from mlci.regions import Regions, as_mask
 from mlci.sampled import weights
 from mlci.sampled.adaptation import adapted_proposal
 from mlci.sampled.diagnosis import SamplingDiagnosis
+from mlci.sampled.model_check import check_model
 from mlci.sampled.modes import Modes, find_modes
 from mlci.sampled.passage import Passage
 from mlci.sampled.proposals import draw
@@ -53,7 +54,8 @@ class SampledModel:
         replicates: of probabilities, from which errors of a ranking are told.
 
     Raises:
-        ValueError: a number that is not positive.
+        ValueError: a number that is not positive, or not whole where it counts something; regions
+            or a limit of another dimension, or a limit without width.
     """
 
     system: System
@@ -69,9 +71,7 @@ class SampledModel:
     replicates: int = 200
 
     def __post_init__(self) -> None:
-        for name in ("dt", "temperature", "samples", "substeps", "restarts", "tolerance"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"SampledModel.{name} must be positive: {getattr(self, name)}")
+        check_model(self)
 
     def passage(self, task: Task, *, round_horizon: bool = False) -> Passage:
         """The random motion of a task.

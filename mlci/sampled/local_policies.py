@@ -68,7 +68,16 @@ class LocalPolicies:
 
 
 def riccati_policies(passage: Passage, modes: Modes) -> tuple[LocalPolicies, Floats]:
-    """The policy round each mode, and the log of the integral of its Gaussian (M,) [nat]."""
+    """The policy round each mode, and the log of the integral of its Gaussian (M,) [nat].
+
+    Where the recursion diverges, the policy is that of a reward without dynamics: no feedback.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _backwards(passage, modes)
+
+
+def _backwards(passage: Passage, modes: Modes) -> tuple[LocalPolicies, Floats]:
+    """See `riccati_policies`."""
     states, controls = modes.states, modes.controls
     members, steps, m = controls.shape
     n = states.shape[-1]
@@ -78,8 +87,12 @@ def riccati_policies(passage: Passage, modes: Modes) -> tuple[LocalPolicies, Flo
     shift, gain, covariance = (
         np.empty((members, steps, *shape)) for shape in ((m,), (m, n), (m, m))
     )
+    alone, diverges = np.empty((members, steps)), np.zeros(members, dtype=bool)
     for k in range(steps - 1, -1, -1):
         q, q_slope, least = _expansion(passage, states[:, k], controls[:, k], slope, curvature)
+        lost = ~(np.isfinite(q).all(axis=(1, 2)) & np.isfinite(q_slope).all(axis=1))
+        q[lost], q_slope[lost], diverges = np.eye(n + m), 0.0, diverges | lost
+        alone[:, k] = 1 / np.sqrt(np.maximum(_LEAST * least, 1e-12))
         inverse = _inverse(q[:, n:, n:], least)
         across = q[:, n:, :n]
         covariance[:, k] = inverse
@@ -88,7 +101,11 @@ def riccati_policies(passage: Passage, modes: Modes) -> tuple[LocalPolicies, Flo
         slope = q_slope[:, :n] + np.einsum("bji,bj->bi", across, shift[:, k])
         curvature = q[:, :n, :n] + across.mT @ gain[:, k]
         curvature = (curvature + curvature.mT) / 2
+    for member in range(members):
+        diverges[member] |= not _has_root(covariance[member])
+    shift[diverges], gain[diverges], covariance[diverges] = 0.0, 0.0, np.eye(m)
     root = np.linalg.cholesky(covariance)
+    root[diverges] *= alone[diverges, :, None, None]
     log_volume = np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=(1, 2))
     log_integral = -modes.cost + log_volume + steps * m / 2 * np.log(2 * np.pi)
     policies = LocalPolicies(np.arange(members), states[:, :-1], controls + shift, gain, root)
@@ -120,6 +137,17 @@ def _jacobian(passage: Passage, point: Floats, n: int) -> Floats:
     of = passage.system, point[..., :n], point[..., n:], passage.dt
     rate = np.concatenate(passage.integrator.rate_jacobians(*of), axis=-1)
     return np.asarray(np.eye(n, point.shape[-1]) + passage.dt * rate)
+
+
+def _has_root(covariance: Floats) -> bool:
+    """Whether matrices (T, m, m) are finite and positive definite, rounding included."""
+    if not np.isfinite(covariance).all():
+        return False
+    try:
+        np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def _inverse(q_uu: Floats, least: Floats) -> Floats:

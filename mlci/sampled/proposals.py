@@ -79,7 +79,13 @@ class Draws:
 
 
 def draw(passage: Passage, proposal: Proposal, rng: np.random.Generator) -> Draws:
-    """Draw paths from a proposal and weigh them."""
+    """Draw paths from a proposal and weigh them; one that diverges has no weight, and no mode."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _drawn(passage, proposal, rng)
+
+
+def _drawn(passage: Passage, proposal: Proposal, rng: np.random.Generator) -> Draws:
+    """See `draw`."""
     component = np.repeat(np.arange(len(proposal.count)), proposal.count)
     paths, controls = _roll_out(passage, proposal, component, rng)
     log_densities = _log_densities(passage, proposal, paths[:, : -1 : passage.substeps], controls)
@@ -91,6 +97,7 @@ def draw(passage: Passage, proposal: Proposal, rng: np.random.Generator) -> Draw
     mode = proposal.policies.mode[proposal.policy]
     of_mode = (mode[:, None] == np.arange(np.max(mode) + 1)).astype(float)
     mode_share = np.exp(log_parts - log_mixture[:, None]) @ of_mode
+    mode_share[~np.isfinite(log_mixture)] = 0.0
     excess = passage.excess(paths[:, -1])
     return Draws(component, controls, paths, log_weight, excess, mode_share)
 

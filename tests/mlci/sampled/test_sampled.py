@@ -10,8 +10,8 @@ from mlci.maxent import TrajectoryDistribution
 from mlci.models import forecast_of
 from mlci.regions import Regions
 from mlci.sampled.distribution import SampledModel, SamplingDiagnosis
-from mlci.spaces import Box, Floats
-from mlci.systems import Pendulum
+from mlci.spaces import Box, Floats, StateSpace
+from mlci.systems import FunctionSystem, Pendulum, TelescopingPendulum
 from mlci.tabular import action_grid, discretize
 
 PENDULUM = Pendulum()
@@ -204,3 +204,42 @@ def test_nothing_is_unavoidable_only_because_no_sample_avoids_it():
     np.testing.assert_allclose(forecast.avoidance[never], 0.5 / distribution.diagnosis.effective)
     assert np.all(forecast.sampling.replicates > 0)
     assert forecast.sampling.unresolved(forecast.avoidance[None])[0, never].all()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"samples": 2.5}, r"SampledModel\.samples must be a whole number from 0 on: 2\.5"),
+        ({"substeps": np.inf}, "substeps must be a whole number"),
+        ({"seed": -1}, "seed must be a whole number"),
+        ({"replicates": -1}, "replicates must be a whole number"),
+        ({"temperature": np.inf}, "temperature must be finite"),
+        ({"limit": Box([0.0], [0.0])}, "limit needs a range above 0 of each of 1 controls"),
+        ({"limit": Box([-1.0, -1.0], [1.0, 1.0])}, "each of 1 controls"),
+        ({"system": TelescopingPendulum()}, "do not fit a state space of 4"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(change, words):
+    with pytest.raises(ValueError, match=words):
+        replace(MODEL, **change)
+
+
+@pytest.mark.parametrize(("linear", "cubic"), [(1.0, 50.0), (40.0, 0.0), (80.0, 0.0)])
+def test_paths_that_diverge_have_no_weight(linear, cubic):
+    """Where noise blows up, or the recursion does, what is left has finite probabilities."""
+    space = StateSpace(Box([-3.0, -3.0], [3.0, 3.0]), [False, False], ("x", "y"))
+
+    def rates(x, u):
+        push = linear * x[..., 0] + cubic * x[..., 0] ** 3 + u[..., 0]
+        return push, linear / 2 * x[..., 1] + 0.9 * u[..., 0] + 0.1 * u[..., 1]
+
+    box = Box([-1.0, -1.0], [1.0, 1.0])
+    system, regions = FunctionSystem(rates, space, box), Regions.from_grid(space, (3, 3))
+    task = Task(np.array([-0.01, 0.0]), Box([-0.28, -0.3], [0.32, 0.3]), 1.0)
+    model = SampledModel(system, regions, 0.1, samples=100, restarts=3, limit=box)
+    with np.errstate(over="ignore", invalid="ignore"):
+        distribution = model.distribution(task)
+    assert not np.isnan(distribution.log_z)
+    assert np.isfinite(distribution.paths).all()
+    if distribution.is_possible:
+        assert np.isfinite(distribution.violation_probabilities()).all()
