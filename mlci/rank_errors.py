@@ -145,7 +145,13 @@ def infer_until_settled(
 
     Returns:
         The last inference, and the errors of its ranking.
+
+    Raises:
+        ValueError: numbers of ranks or samples that are not whole, or below 0.
     """
+    for name, number in (("first", first), ("most", most)):
+        if not isinstance(number, int | np.integer) or number < 0:
+            raise ValueError(f"{name} is a whole number of at least 0, not {number}")
     while True:
         inference = infer(model, demonstrations, progress=task_progress, **options)
         errors = rank_errors(inference)

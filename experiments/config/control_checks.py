@@ -5,11 +5,12 @@ Each check yields a line for each fault: the key, the value and the way out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from experiments.config.settings import ControlRange, ModelSettings, Settings
+from mlci.spaces import Box
 from mlci.systems import System
 
 
@@ -69,6 +70,11 @@ def _range_problems(key: str, listed: tuple[ControlRange, ...], system: System) 
             continue
         if all(end is None for end in (*each.lower, *each.upper)):
             yield f"{key}[{i}]: holds every control; give it an end"
+        elif key.startswith("hypotheses") and _holds_all(each.lower, each.upper, box):
+            yield (
+                f"{key}[{i}]: holds every control from {box.lower.tolist()} to "
+                f"{box.upper.tolist()}; give it an end inside"
+            )
         for k, (low, high) in enumerate(zip(each.lower, each.upper, strict=True)):
             first, last = box.lower[k], box.upper[k]
             if low is not None and high is not None and low >= high:
@@ -80,3 +86,11 @@ def _range_problems(key: str, listed: tuple[ControlRange, ...], system: System) 
                 )
     if len({(each.lower, each.upper) for each in listed}) < len(listed):
         yield f"{key}: a range is given twice; name each once"
+
+
+def _holds_all(lower: Sequence[float | None], upper: Sequence[float | None], box: Box) -> bool:
+    """Whether an open range holds a whole box."""
+    return all(
+        (low is None or low < first) and (high is None or high > last)
+        for low, high, first, last in zip(lower, upper, box.lower, box.upper, strict=True)
+    )

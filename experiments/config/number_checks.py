@@ -58,6 +58,10 @@ def count_problems(settings: Settings) -> Iterator[str]:
     yield from _division_problems("demonstrations.dt", demonstrations.dt, settings.horizon)
     for i, step in enumerate(settings.models.steps):
         yield from _division_problems(f"models.steps[{i}]", step, settings.horizon)
+    steps, counts = settings.models.steps, settings.resolution.counts
+    for key, values in (("models.steps", steps), ("resolution.counts", counts)):
+        if len(set(values)) < len(values):
+            yield f"{key}: {list(values)} holds a value twice; give each once"
 
 
 def advice_count_problems(settings: AdviceSettings) -> Iterator[str]:
@@ -75,7 +79,13 @@ def budget_problems(settings: AdviceSettings) -> Iterator[str]:
 def size_problems(settings: ModelSettings) -> Iterator[str]:
     """What is too large to hold."""
     needed, there = expected_memory(settings) / 1e9, machine_memory() / 1e9
-    if needed > there:
+    if needed > there and settings.sampling is not None:
+        yield (
+            f"sampled.most: {settings.sampling.most} paths of a task, {settings.sampling.substeps} "
+            f"substeps and these hypotheses take about {needed:.3g} GB, and this machine has "
+            f"{there:.3g}; lower sampled.most, sampled.substeps or hypotheses, or raise dt"
+        )
+    elif needed > there:
         yield (
             f"grid.shape: {list(settings.grid.shape)} with {list(settings.action_counts)} actions, "
             f"{settings.transition.samples} samples and these hypotheses takes about {needed:.3g} "
@@ -137,6 +147,13 @@ def _cell_problems(settings: ModelSettings, asked: Mapping[str, tuple[Any, Any]]
                 f"{key}: {_word(value)} needs cells, and model=sampled has none; set it to "
                 f"{_word(nothing)}, or take model=tabular"
             )
+    bounds = settings.model.space.bounds
+    largest = float(max(abs(bounds.lower).max(), abs(bounds.upper).max()))
+    if largest - sampling.tolerance == largest:
+        yield (
+            f"sampled.tolerance: {sampling.tolerance} is lost in the rounding of states as large "
+            f"as {largest:g}; raise it"
+        )
     if sampling.most < sampling.samples:
         yield (
             f"sampled.most: {sampling.most} is less than the {sampling.samples} of "

@@ -164,7 +164,7 @@ def _checked_tolerance(system: System, tolerance: Floats | float) -> Floats:
         ValueError: a tolerance that is negative or of another number of controls.
     """
     reach, controls = np.asarray(tolerance, dtype=float), system.control_box.dimension
-    if reach.shape not in ((), (controls,)) or not np.all(reach >= 0):
+    if reach.shape not in ((), (controls,)) or not np.all((reach >= 0) & (reach < np.inf)):
         raise ValueError(
             f"a tolerance needs {controls} numbers of at least 0, one a control, not {tolerance}"
         )

@@ -55,7 +55,8 @@ class ControlPredicates(ControlHypotheses):
         object.__setattr__(self, "names", names)
 
     def check(self, system: System) -> None:
-        """See `ControlHypotheses.check`: shapes and numbers that they return, at random pairs."""
+        """See `ControlHypotheses.check`: shapes and numbers that they return, at random pairs, and
+        that they return the same again."""
         rng, bounds, box = np.random.default_rng(0), system.space.bounds, system.control_box
         states = rng.uniform(bounds.lower, bounds.upper, (_PAIRS, bounds.dimension))
         controls = rng.uniform(box.lower, box.upper, (_PAIRS, box.dimension))
@@ -78,18 +79,33 @@ class ControlPredicates(ControlHypotheses):
                     f"control predicate {name} returned NaN for states and controls within their "
                     "bounds"
                 )
+            if not np.array_equal(values, np.asarray(function(states, controls))):
+                raise ValueError(
+                    f"control predicate {name} answers differently when it is asked again: it must "
+                    "depend on states and controls alone"
+                )
 
     def holds(self, states: Floats, controls: Floats) -> Bools:
         """See `ControlHypotheses.holds`."""
         shape = np.broadcast_shapes(np.shape(states)[:-1], np.shape(controls)[:-1])
         pairs = [np.broadcast_to(part, (*shape, np.shape(part)[-1])) for part in (states, controls)]
         held = np.zeros((*shape, len(self)), dtype=bool)
-        for column, function in enumerate(self.functions):
-            held[..., column] = _is_yes(function(*pairs))
+        for column, (name, function) in enumerate(zip(self.names, self.functions, strict=True)):
+            held[..., column] = _is_yes(name, function(*pairs), shape)
         return held
 
 
-def _is_yes(answer: Any) -> Bools:
-    """Truth values as they are; levels where they are below 0."""
+def _is_yes(name: str, answer: Any, shape: tuple[int, ...]) -> Bools:
+    """Truth values as they are; levels where they are below 0.
+
+    Raises:
+        ValueError: another shape, or NaN.
+    """
     values = np.asarray(answer)
+    if values.shape != shape or (values.dtype.kind == "f" and np.isnan(values).any()):
+        raise ValueError(
+            f"control predicate {name} must return a truth value or a level a pair, of shape "
+            f"{shape}; it returned {values.dtype} of shape {values.shape}"
+            f"{' with NaN' if values.shape == shape else ''}"
+        )
     return values if values.dtype.kind == "b" else np.asarray(values < 0)

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from mlci.sampled.distribution import SampledModel
 
-_POSITIVE = ("dt", "temperature", "samples", "substeps", "restarts", "tolerance")
+_POSITIVE = ("dt", "temperature", "samples", "substeps", "restarts", "tolerance", "replicates")
 _COUNTS = ("samples", "substeps", "restarts", "seed", "replicates")
 
 

@@ -106,3 +106,9 @@ def test_a_tabular_ranking_has_no_errors_and_no_other_model_is_taken():
         infer(MODEL, SWINGS, exact_ends=False)
     with pytest.raises(TypeError, match="a TabularModel or a SampledModel"):
         forecasters(PENDULUM, [], round_horizon=False, exact_ends=True)
+
+
+@pytest.mark.parametrize("options", [{"first": 1.5}, {"first": -1}, {"most": np.nan}])
+def test_ranks_that_cannot_be_settled_are_refused(options):
+    with pytest.raises(ValueError, match="is a whole number of at least 0"):
+        infer_until_settled(MODEL, [], **options)

@@ -77,6 +77,10 @@ def test_regions_limit_no_control() -> None:
         (ranges("truth.controls", "2 null"), "holds nothing of control 0, which goes from -2 to 2"),
         (ranges("truth.controls", "null null"), "truth.controls[0]: holds every control"),
         (
+            ranges("hypotheses.controls.ranges", "-9 9"),
+            "hypotheses.controls.ranges[0]: holds every control from [-2.0] to [2.0]; give it an",
+        ),
+        (
             ranges("truth.controls", "0.5 null", "0.5 null"),
             "truth.controls: a range is given twice",
         ),

@@ -108,6 +108,24 @@ def test_a_budget_below_the_first_samples_is_refused() -> None:
         read_config(composed("model=sampled", "sampled.most=100"))
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("sampled.tolerance=1e-300", r"sampled\.tolerance: 1e-300 is lost in the rounding"),
+        ("sampled.substeps=1000000", r"sampled\.most: .*; lower sampled\.most, sampled\.substeps"),
+    ],
+)
+def test_what_samples_cannot_be_is_refused(words: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        read_config(composed("model=sampled", words))
+
+
+@pytest.mark.parametrize("words", ["models.steps=[0.5,0.5]", "resolution.counts=[100,100]"])
+def test_what_is_given_twice_is_refused(words: str) -> None:
+    with pytest.raises(ConfigError, match="holds a value twice"):
+        read_config(composed(words))
+
+
 def test_advice_on_models_follows_what_both_say() -> None:
     well = SamplingDiagnosis(4000, 0.7, 1500.0, 0.2, np.ones(1), 0.0, 2)
     alike = ModelChoice(0.3, well, 0.005, 0.006, 0.02)

@@ -20,6 +20,7 @@ MODEL = mlci.discretize(
     WALKER, mlci.Grid(LINE, (5,)), ACTIONS, 1.0, mlci.Regions.from_boxes(LINE, [])
 )
 CART = mlci.DoubleIntegrator()
+CHANCE = np.random.default_rng(0)
 
 
 def right_on_the_right(states: Floats, controls: Floats) -> Floats:
@@ -153,6 +154,9 @@ def test_what_is_no_list_of_predicates_is_refused(make, message) -> None:
         (lambda x, u: u, "must return a truth value"),
         (lambda x, u: np.full(len(x), "yes"), "must return a truth value"),
         (lambda x, u: np.full(len(x), np.nan), "returned NaN"),
+        (lambda x, u: u[..., 0] > CHANCE.normal(), "answers differently when it is asked again"),
+        (lambda x, u: x[..., 0] * (1 if len(x) == 4096 else np.nan), r"it returned float64 .* NaN"),
+        (lambda x, u: u[..., 0] > 0 if len(x) == 4096 else True, r"it returned bool of shape \(\)"),
         (lambda x, u: x[..., 7] > 0, "bad fails for states .* IndexError"),
         (lambda x: x, "bad fails for states .* TypeError"),
         (lambda x, u: x[..., 0] > 99, "bad forbids none of the model's moves, of 3 actions"),
@@ -163,7 +167,7 @@ def test_predicate_that_cannot_be_asked_is_refused(function, message) -> None:
         mlci.infer_controls(MODEL, [], mlci.ControlPredicates([function], ("bad",)))
 
 
-@pytest.mark.parametrize("tolerance", [-0.1, np.nan, [0.1, 0.1]])
+@pytest.mark.parametrize("tolerance", [-0.1, np.nan, np.inf, [0.1, 0.1]])
 def test_tolerance_must_fit_the_controls(tolerance) -> None:
     with pytest.raises(ValueError, match="1 numbers of at least 0, one a control"):
         mlci.infer_controls(MODEL, [], PAIRS, tolerance=tolerance)

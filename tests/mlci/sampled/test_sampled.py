@@ -212,7 +212,7 @@ def test_nothing_is_unavoidable_only_because_no_sample_avoids_it():
         ({"samples": 2.5}, r"SampledModel\.samples must be a whole number from 0 on: 2\.5"),
         ({"substeps": np.inf}, "substeps must be a whole number"),
         ({"seed": -1}, "seed must be a whole number"),
-        ({"replicates": -1}, "replicates must be a whole number"),
+        ({"replicates": 0}, "replicates must be positive"),
         ({"temperature": np.inf}, "temperature must be finite"),
         ({"limit": Box([0.0], [0.0])}, "limit needs a range above 0 of each of 1 controls"),
         ({"limit": Box([-1.0, -1.0], [1.0, 1.0])}, "each of 1 controls"),
