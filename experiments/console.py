@@ -271,7 +271,7 @@ def measure_lines(summary: pd.Series, ranks: pd.DataFrame, top: int) -> Iterator
         f"{summary['violation_distance_pooled']:.2f} pooled",
     )
     if ranks["rank"].isna().all():
-        yield from entry("", "nothing is forbidden, so there is no truth to rank")
+        yield from entry("", "no region is forbidden, so there is no truth to rank")
         return
     sizes = ranks["demonstrations"]
     for size in sorted({1, 5, 9, sizes.max()}.intersection(sizes)):

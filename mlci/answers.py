@@ -252,7 +252,10 @@ def of_cells(
 def _(
     model: TabularModel, inference: Inference, hypotheses: Bools | None
 ) -> tuple[Bools, TieClass | None]:
-    return cut_by(model.equal_cells, inference.hypotheses), tie_class(model, inference, hypotheses)
+    cut = np.zeros(inference.hypotheses.lower.shape, dtype=bool)
+    if isinstance(model.grid, Grid):  # cells of varying size are cut where that matters
+        cut = cut_by(model.grid, inference.hypotheses)
+    return cut, tie_class(model, inference, hypotheses)
 
 
 def unseen(inference: Inference) -> Ints:

@@ -60,7 +60,9 @@ class Diagnosis:
         if found:
             frozen = max(self.frozen) > MOST_FROZEN
             ways = "a longer time step, more cells" if frozen else "more actions, a shorter step"
-            found.append(f"remedy: {ways}, or start points averaged over the cell (samples=3)")
+            found.append(
+                f"remedy: {ways}, or start points averaged over the cell (transition.samples=3)"
+            )
         if self.leave > MOST_LEAVING:
             found.append(
                 f"{self.leave:.0%} of the moves leave the state space: widen its bounds or take "

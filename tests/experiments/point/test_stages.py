@@ -93,7 +93,7 @@ def test_nothing_forbidden_needs_no_safe_set_and_ranks_nothing(tmp_path: Path) -
     settings = composed("truth=none", "inference=paper", "scale=smoke", "ranks.subsets=2", "dt=1.0")
     lines: list[str] = []
     tables = run_point(settings, Store(tmp_path), lines.append)
-    assert lines[-1].strip() == "nothing is forbidden, so there is no truth to rank"
+    assert lines[-1].strip() == "no region is forbidden, so there is no truth to rank"
     assert not any("nan" in line for line in lines)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "demonstrations",
