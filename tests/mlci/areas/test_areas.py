@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from mlci.areas.belief import infer_area
+from mlci.areas.belief import AreaBelief, infer_area
 from mlci.areas.evidence import ShapeEvidence, points_met, sample_paths
 from mlci.areas.overlap import best_area, expected_overlap
 from mlci.areas.prior_shapes import draw_shapes
@@ -74,6 +74,26 @@ def test_paths_have_the_ends_of_their_task() -> None:
     assert np.all(paths[:, -1, 0] == 1.25)
     assert len(np.unique(paths[:, -1, 1])) > 1
     assert np.all(GRID.index(paths[:, 1:-1]) >= 0)
+
+
+@pytest.mark.parametrize(("steps", "goal"), [(3, [0.1, 0.35]), (1, [-0.2, 0.1])])
+def test_paths_are_in_each_cell_as_often_as_the_forward_pass_says(
+    steps: int, goal: list[float]
+) -> None:
+    """From and to states off the middle of their cells."""
+    task = Task(np.array([-0.6, -0.15]), Box.point(goal), 0.5 * steps)
+    distribution = TrajectoryDistribution.of_task(MODEL, task, exact_ends=True)
+    paths = sample_paths(distribution, 2000, np.random.default_rng(0))
+    assert np.all(paths[:, -1] == goal)
+    for t, chance in enumerate(distribution.occupancies()):
+        share = np.bincount(GRID.index(paths[:, t]), minlength=GRID.size) / 2000
+        np.testing.assert_array_less(abs(share - chance), 4 * np.sqrt(chance / 2000) + 1e-9)
+
+
+def test_a_path_meets_the_cell_in_which_it_ends() -> None:
+    raster = Grid(POINT.space, (3, 1))  # borders at -0.5 and 0.5
+    met = points_met(raster, np.array([[[-0.4, 0.0], [0.51, 0.0]]])).toarray()[0] > 0
+    assert met.tolist() == [False, True, True]
 
 
 def test_a_path_meets_every_cell_on_its_way_across_the_seam() -> None:
@@ -149,6 +169,12 @@ def test_no_area_where_every_shape_is_excluded() -> None:
     assert np.isnan(belief.overlap)
 
 
+def test_a_shape_that_holds_no_point_of_the_raster_is_not_told_of() -> None:
+    evidence = by_hand(Rates())
+    evidence.inside[:, 2] = False
+    assert evidence.feasible.tolist() == [0, 1, 3]  # the last one is entered
+
+
 def test_some_demonstrations_are_those_by_number() -> None:
     evidence = by_hand(Rates(0.05))
     both = evidence.pair_gains(np.arange(4))
@@ -169,6 +195,13 @@ def test_parts_of_an_area_hang_together() -> None:
     np.testing.assert_allclose(large.hull.lower, [-1.2, -0.4], atol=0.1)
     np.testing.assert_allclose(small.hull.upper, [1.1, 0.3], atol=0.1)
     assert large.probability == pytest.approx(1)
+
+
+def test_a_part_is_as_probable_as_its_most_probable_point() -> None:
+    raster = Grid(StateSpace(Box([0.0], [6.0]), [False], ("place",)), (6,))
+    chance = np.array([0.4, 0.8, 0.6, 0.1, 0.5, 0.3])
+    belief = AreaBelief(raster, np.array([0, 1.0, 0]), chance, chance > 0.3, 0.5, (0,), 0.4)
+    assert [part.probability for part in belief.parts] == [0.8, 0.5]
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -193,12 +226,33 @@ def test_the_best_area_of_a_small_raster(seed: int) -> None:
     assert expected_overlap(areas[77], draws, probability) == pytest.approx(values[77])
 
 
+def test_the_best_area_may_be_no_level_of_the_chances() -> None:
+    """It is climbed to: what is above some chance overlaps by 0.498 at most."""
+    rows = ["00111110", "01010010", "01111111", "00001110", "10000001"]
+    draws = np.array([[point == "1" for point in row] for row in rows])
+    probability = np.array([0.29, 0.06, 0.08, 0.25, 0.32])
+    areas = np.array(list(itertools.product([False, True], repeat=8)))
+    shared = (areas[:, None] & draws).sum(axis=2) / (areas[:, None] | draws).sum(axis=2)
+    value = best_area(draws, probability)[1]
+    assert value == pytest.approx(np.max(shared @ probability))
+    assert value > 0.51
+
+
+def test_nothing_overlaps_with_nothing_in_full() -> None:
+    nothing = np.zeros(3, dtype=bool)
+    draws = np.array([[False] * 3, [True, False, False]])
+    assert expected_overlap(nothing, draws, np.array([0.3, 0.7])) == 0.3
+
+
 def test_drawn_shapes_have_the_widths_that_are_asked_for() -> None:
     space, rng = POINT.space, np.random.default_rng(0)
     shapes = draw_shapes(space, 200, 0.1, 0.2, rng, free=[False, True])
     radii = np.array([shapes.shape(i).radii for i in range(200)])
     assert 0.3 <= radii[:, 0].min() < 0.32 < 0.58 < radii[:, 0].max() <= 0.6
     assert np.all(np.isinf(radii[:, 1]))
+    centers = np.array([shapes.shape(i).center for i in range(200)])
+    assert np.all(centers.min(axis=0) < -1.4)  # all over the space, which is 1.5 m to each side
+    assert np.all(centers.max(axis=0) > 1.4)
     assert draw_shapes(space, 5, 0.1, 0.2, rng, boxes=True).are_boxes.all()
 
 
