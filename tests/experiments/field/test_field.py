@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,8 @@ def test_scores_by_hand() -> None:
     log_posterior = 46 * np.log(0.9) + 3 * np.log(0.5)
     assert scores["log_posterior"] == pytest.approx(log_posterior)
     assert scores["calibration"] == pytest.approx(-0.1)
+    one = score(case, Answer(np.where(np.arange(49) == 21, 0.0, -np.inf)), rng)
+    assert (one["top"], one["precision"], one["recall"]) == pytest.approx((1 / 5, 1, 1 / 5))
     knows = score(case, Answer(truth.astype(float), truth), rng)
     assert knows["violations"] == pytest.approx(0, abs=1e-12)
     assert knows["reward_lost"] == pytest.approx(0, abs=1e-9)
@@ -131,6 +134,14 @@ def test_scores_by_hand() -> None:
     blocked = score(case, Answer(truth.astype(float), ~np.eye(49, dtype=bool)[0]), rng)
     assert blocked["stuck"] == 1
     assert np.isnan(blocked["reward_lost"])
+    claimed = score(case, Answer(truth.astype(float), claimed=0.3), rng)
+    assert claimed["calibration"] == pytest.approx(0.3 - 1)
+    in_part = replace(case, cover=np.where(truth, 0.8, 0.0) + 0.3 * (np.arange(49) == 0))
+    scores_in_part = score(in_part, Answer(truth.astype(float), truth), rng)
+    assert scores_in_part["recall"] == pytest.approx(4 / 4.3)
+    assert scores_in_part["iou"] == pytest.approx(4 / 5.3)
+    nothing = replace(case, cover=np.zeros(49))
+    assert score(nothing, Answer(np.zeros(49), np.zeros(49, dtype=bool)), rng)["iou"] == 1
     assert SCORES.keys() == scores.keys() | {"seconds"}
 
 

@@ -54,6 +54,39 @@ def test_alpha_is_the_share_of_trajectories_without_such_a_pair(exact_ends: bool
     assert 0.1 < alpha[0, 1] < 0.9
 
 
+@pytest.mark.parametrize(
+    ("start", "goal", "steps", "last"), [(1.5, 3.9, 2, 3.2), (2.9, 3.2, 1, 3.05)]
+)
+def test_the_last_pair_is_on_the_way_that_is_bent_to_the_goal(
+    start: float, goal: float, steps: int, last: float
+) -> None:
+    """There is one way: up. Its last middle is at 3 from centre to centre."""
+    task = mlci.Task(np.array([start]), mlci.Box.point([goal]), float(steps))
+    reached = mlci.ControlPredicates(
+        [lambda x, u: x[..., 0] > last - 0.01, lambda x, u: x[..., 0] > last + 0.01],
+        ("until here", "and beyond"),
+    )
+    assert ControlledMoves.of(MODEL, reached).avoidance([task])[0].tolist() == [0, 1]
+
+
+def test_a_level_of_0_is_a_border_that_is_not_forbidden() -> None:
+    pushes = mlci.ControlPredicates([lambda x, u: -u[..., 0]], ("pushes",))
+    held = pushes.holds(np.zeros((3, 2)), np.array([[-0.1], [0.0], [0.1]]))
+    assert held[:, 0].tolist() == [False, False, True]
+
+
+def test_states_of_moves_across_the_seam_are_wrapped() -> None:
+    pendulum = mlci.Pendulum()
+    outside = mlci.ControlPredicates(
+        [lambda x, u: (u[..., 0] > 0) | (x[..., 0] < 0) | (x[..., 0] > 2 * np.pi)], ("outside",)
+    )
+    cells, actions = mlci.Grid(pendulum.space, (8, 8)), mlci.action_grid(pendulum, 3)
+    model = mlci.discretize(
+        pendulum, cells, actions, 0.3, mlci.Regions.from_boxes(pendulum.space, [])
+    )
+    assert ControlledMoves.of(model, outside).shares == pytest.approx([1 / 3])
+
+
 def test_pair_is_the_state_in_the_middle_and_the_mean_control() -> None:
     path = mlci.rollout(CART, [0.0, 0.0], [[0.6]] * 8 + [[-0.2]] * 8, 0.125)
     times = np.arange(17) * 0.125

@@ -14,6 +14,8 @@ from mlci.actuation.ranges import ControlRanges
 from mlci.demonstrations import Demonstration, Task
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.evidence import DEFAULT_MODEL_ERROR, Rates
+from mlci.exploration import explore
+from mlci.forecasts import ForecastCurve, ForecastMap
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.regions import Regions
@@ -53,6 +55,17 @@ def test_alpha_is_the_share_of_trajectories_that_take_no_such_action() -> None:
         np.testing.assert_allclose(alpha[0], avoiding / weights, atol=1e-12)
     assert alpha[0, 0] == 0
     assert 0 < alpha[0, 1] < 1
+
+
+def test_shares_are_of_the_moves_that_are_known() -> None:
+    """In two steps from the left end a walker comes to three cells of five."""
+    actions = np.array([[-1.0], [0.0], [1.0]])
+    model = discretize(WALKER, Grid(LINE, (5,)), actions, 1.0, NO_REGIONS)
+    task = Task(np.array([0.5]), Box([2.0], [3.0]), 2.0)
+    active = explore(model, [task], bounded=False)
+    assert active.explored is not None
+    assert np.sum(active.explored.cells) < 5
+    np.testing.assert_allclose(ControlledMoves.of(active, FAST).shares, [1 / 3, 1 / 3, 2 / 3])
 
 
 @pytest.mark.parametrize("exact_ends", [False, True])
@@ -152,6 +165,19 @@ def test_limit_is_what_a_range_leaves() -> None:
             ranges.left_of(box, i)
 
 
+def test_limit_is_what_all_ranges_leave() -> None:
+    ranges = ControlRanges([[0.5], [0.8], [-np.inf]], [[np.inf], [np.inf], [-0.6]])
+    left = ranges.left_by_all(Box([-1.0], [1.0]))
+    assert (left.lower.tolist(), left.upper.tolist()) == ([-0.6], [0.5])
+
+
+def test_shares_are_of_the_way_from_the_middle_of_a_range() -> None:
+    forward = FunctionSystem(lambda x, u: (u[..., 0],), LINE, Box([-1.0], [3.0]))
+    ranges = ControlRanges.beyond(forward, [0.5])
+    assert ranges.lower.tolist() == [[2.0], [-np.inf]]
+    assert ranges.upper.tolist() == [[np.inf], [0.0]]
+
+
 def test_a_joint_that_will_not_push_is_found() -> None:
     ranges = ControlRanges.beyond(CART, [0.5])
     limit = ranges.left_of(CART.control_box, 0)
@@ -180,6 +206,33 @@ def test_posterior_is_that_of_equation_5() -> None:
     likelihood = np.where(inference.applied[0], 0.0, 1 / inference.avoidance[0])
     weight = np.append(0.1 * likelihood, 0.4)
     np.testing.assert_allclose(inference.ranking.posterior, (weight / weight.sum())[:-1], rtol=1e-9)
+
+
+def test_a_map_of_forecasts_takes_the_place_of_the_model_error() -> None:
+    """Each share of the moves has the curve of its size; of 9 actions a ninth is above 0.75."""
+    path = cart_path([0.1 * LIMIT, 0.0, -0.1 * LIMIT])
+    regions = Regions.from_boxes(CART.space, [])
+    model = discretize(CART, Grid(CART.space, (24, 16)), action_grid(CART, 9), 0.25, regions)
+    curves = [
+        ForecastCurve(sizes, 9, 99, 0.0, 0.0, 0.0, ceiling=ceiling)
+        for sizes, ceiling in (((0.05, 0.15), 0.6), ((0.2, 0.5), 0.9))
+    ]
+    inferred = infer_controls(model, [path], RANGES, calibration=ForecastMap(tuple(curves)))
+    assert not inferred.applied.any()
+    of_few = np.isclose(inferred.shares, 1 / 9)
+    assert of_few.tolist() == [False, False, True] * 2
+    mapped = [each.avoidance(inferred.avoidance[0]) for each in curves]
+    gain = -np.log(np.where(of_few, *mapped))
+    assert np.max(np.abs(mapped[0] - mapped[1])[of_few]) > 0.01
+    np.testing.assert_allclose(inferred.ranking.gain, gain, atol=1e-12)
+
+
+def test_a_demonstration_shorter_than_a_time_step_is_one_window() -> None:
+    path = cart_path([0.6 * LIMIT], hold=30)  # 0.3 s
+    regions, actions = Regions.from_boxes(CART.space, []), action_grid(CART, 9)
+    model = discretize(CART, Grid(CART.space, (12, 8)), actions, 0.5, regions)
+    inference = infer_controls(model, [path], RANGES, round_horizon=True)
+    assert inference.applied.tolist() == [[True, True, False, False, False, False]]
 
 
 @pytest.mark.parametrize("exact_ends", [False, True])

@@ -13,8 +13,8 @@ from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.grids import Grid
 from mlci.outlook.flow import control_reach, flow_expansion
 from mlci.simulate import rollout
-from mlci.spaces import Box
-from mlci.systems import DoubleIntegrator, Pendulum
+from mlci.spaces import Box, StateSpace
+from mlci.systems import DoubleIntegrator, FunctionSystem, Pendulum
 from mlci.zoo.damped_spring import DampedSpring
 
 DOOR = DampedSpring()
@@ -63,6 +63,21 @@ def test_it_is_that_of_differences_between_paths() -> None:
         expected,
         abs=6e-3,  # each step takes the slope at its start: the error is of order dt
     )
+
+
+def test_steps_of_a_flow_follow_each_other() -> None:
+    """Against differences, where what stretches first and what later does not commute."""
+    box, widths = Box([-4.0, -4.0], [4.0, 2.0]), np.array([8.0, 6.0])
+    space = StateSpace(box, [False, False], ("x", "y"))
+    system = FunctionSystem(
+        lambda x, u: (x[..., 0] * x[..., 1] + u[..., 0], 1.0 - x[..., 0]), space, Box([-1.0], [1.0])
+    )
+    start, step = np.array([0.2, -0.5]), 1e-5
+    path = path_of(system, start, 2.0, 400)
+    ends = [rollout(system, start + d, path.controls, 0.005)[-1] for d in np.diag(step * widths)]
+    stretch = ((np.array(ends) - path.states[-1]) / step / widths).T
+    expected = np.log(np.linalg.norm(stretch, ord=2))
+    assert flow_expansion(system, path) == pytest.approx(expected, abs=6e-3)  # 0.5 more reversed
 
 
 def test_a_path_without_controls_is_refused() -> None:

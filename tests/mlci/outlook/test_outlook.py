@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mlci.demonstrator import demonstrate, sample_trials
-from mlci.diagnosis import diagnose
+from mlci.diagnosis import Diagnosis, diagnose
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
-from mlci.outlook.outlook import FEATURES, outlook
+from mlci.outlook.outlook import FEATURES, Outlook, outlook
 from mlci.regions import Regions
 from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator
@@ -63,6 +65,21 @@ def test_each_number_is_that_of_a_loop(model, paths) -> None:
                 telling = sum(entered[j, k] and not entered[j, i] for j in range(6)) / 6
                 rivals += (1 - telling) ** 4
         assert features["rivals"][i] == pytest.approx(np.log(1 + rivals), abs=1e-12)
+
+
+def test_forecasts_of_tasks_out_of_reach_are_no_errors() -> None:
+    entered = np.array([[1, 0, 0], [1, 1, 0], [0, 1, 1]], dtype=bool)
+    phi = np.array([[0.9, 0.1, 0.0], [0.8, 0.7, 0.0], [0.0, 0.0, 0.0]])
+    known = Outlook(
+        *(Diagnosis(0.0, 0.0, 2.0, (0.1, 0.2)), np.array([1.5, 0.8]), 0.5),
+        *(np.array([True, True, False]), entered, phi),
+    )
+    assert known.forecast_error == pytest.approx((0.2 + 0.5) / 2 / (5 / 3))
+    nobody = replace(known, reachable=np.zeros(3, dtype=bool))
+    assert nobody.forecast_error == 1
+    assert known.features(2)[0, FEATURES.index("reach")] == np.log(0.8 + 0.01)  # the least
+    # Of the second region's rivals the first is entered without it by a third of the tasks.
+    assert known.rivals(2)[1] == pytest.approx((1 - 1 / 3) ** 2)
 
 
 def test_a_mask_takes_the_hypotheses_alone(model, paths) -> None:

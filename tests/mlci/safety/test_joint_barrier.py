@@ -50,6 +50,14 @@ def test_who_brakes_one_joint_never_enters():
         assert np.all(np.any(outcomes, axis=0))
 
 
+def test_who_moves_away_has_the_room_that_there_is():
+    state = np.array([0.1, -0.2, 0.4, -3.0, 0.0, 0.0])  # 0.1 rad below the first box, going down
+    barrier = JointBarrier(ARM, boxes([[0.2, 0.6]]), HELD, BARRIER.braking)
+    assert barrier.value(state) == pytest.approx(0.1)
+    state[3] = 1.0  # up to it, which takes 1 / 12 rad to brake
+    assert barrier.value(state) == pytest.approx(0.1 - 1 / 12)
+
+
 def test_no_control_enters_through_the_filter():
     # Strong controls towards K, changed at random; without the filter most of the paths enter.
     rng = np.random.default_rng(1)
@@ -84,15 +92,19 @@ def test_a_control_that_leads_nowhere_near_passes():
     np.testing.assert_array_equal(changed, [True, False, False])  # the guard's joint alone
 
 
-def test_its_derivatives_are_those_of_what_it_applies():
+@pytest.mark.parametrize(
+    "truth", [TRUTH, boxes([[0.2, 0.6]], [FREE, [-0.8, -0.3]])], ids=["one is near", "two are near"]
+)
+def test_its_derivatives_are_those_of_what_it_applies(truth):
+    barrier = JointBarrier(ARM, truth, HELD, BARRIER.braking)
     states = np.zeros((1, 6))
-    states[0] = 0.1, -0.2, 0.4, 1.0, 0.3, -0.2
+    states[0] = 0.1, -0.2, 0.4, 1.0, -1.2, -0.2
     controls = np.array([[0.5, -0.3, 0.2]])
-    by_state, by_control = BARRIER.linearize(states, controls)
+    by_state, by_control = barrier.linearize(states, controls)
     assert np.abs(by_state).max() > 1
-    expected = first_derivatives(lambda x: BARRIER.apply(x, controls), states)
+    expected = first_derivatives(lambda x: barrier.apply(x, controls), states)
     np.testing.assert_allclose(by_state, expected, rtol=1e-5, atol=1e-5)
-    expected = first_derivatives(lambda u: BARRIER.apply(states, u), controls)
+    expected = first_derivatives(lambda u: barrier.apply(states, u), controls)
     np.testing.assert_allclose(by_control, expected, rtol=1e-5, atol=1e-5)
 
 
