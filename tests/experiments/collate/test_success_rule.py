@@ -7,7 +7,9 @@ import pandas as pd
 import pytest
 from dynamics_study import dynamics
 
-from experiments.collate.success_rule import success_tables
+from experiments.collate.intervals import TAILS
+from experiments.collate.success_rule import success_scores, success_tables
+from mlci.outlook.rule import fit_rule
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +28,24 @@ def test_the_rule_adds_the_number_that_decides_to_expected_violations(made) -> N
     assert (first["least"], first["most"]) == (table.min(), table.max())
 
 
+def test_limits_of_weights_are_those_of_rules_of_resampled_systems(made) -> None:
+    """Each rule is read off from what it foretells at the mean and a standard deviation beside."""
+    table, rule = dynamics(), made["success_rule"]
+    names, number = rule["feature"][:-1].tolist(), np.arange(40).reshape(5, 8)
+    features, top = table[names].to_numpy(), table["top"].to_numpy()
+    mean, scale = (rule[column][:-1].to_numpy() for column in ("mean", "scale"))
+    places = np.vstack([mean + np.diag(scale), mean])
+    rng, found = np.random.default_rng(1), []
+    for _ in range(200):
+        drawn = number[rng.integers(5, size=5)].ravel()
+        p = fit_rule(features[drawn], top[drawn]).probability(places)
+        log_odds = np.log(p / (1 - p))
+        found.append([*(log_odds[:-1] - log_odds[-1]), log_odds[-1]])
+    spread = np.std(found, axis=0)
+    for column, limit in zip(("weight_low", "weight_high"), np.quantile(found, TAILS, axis=0), strict=True):
+        np.testing.assert_array_less(np.abs(rule[column] - limit), 0.7 * spread)
+
+
 def test_the_scores_are_means_of_squared_differences(made) -> None:
     forecasts, scores = made["success_forecasts"], made["success_scores"].set_index("way")
     y = forecasts["top"]
@@ -38,6 +58,14 @@ def test_the_scores_are_means_of_squared_differences(made) -> None:
     # `expected_violations` tells nothing here, and `reach` much.
     assert scores.loc["base_rate", "rule_less_high"] < 0
     assert scores.loc["expected_violations", "rule_less_high"] < 0
+
+
+def test_scores_do_not_depend_on_the_order_of_systems(made) -> None:
+    forecasts = made["success_forecasts"]
+    blocks = [forecasts[forecasts["system"] == f"S{k}"] for k in (3, 0, 4, 1, 2)]
+    larger = pd.concat([*blocks, blocks[0]])  # one system has more points
+    in_order = larger.sort_values("system", kind="stable")
+    pd.testing.assert_frame_equal(success_scores(larger), success_scores(in_order))
 
 
 def test_the_base_rate_of_a_system_is_that_of_the_others(made) -> None:

@@ -11,9 +11,12 @@ from tiny_point import TINY, composed
 
 from experiments.config.read import read_config
 from experiments.point.area_ceilings import ideal_world
+from experiments.point.area_shapes import sizes
+from experiments.point.inference import infer_point
 from experiments.point.run import run_point
-from experiments.point.shape_ways import overlap_scores
+from experiments.point.shape_ways import ShapeWays, overlap_scores
 from experiments.tracking.store import Store
+from mlci.areas.belief import infer_area
 from mlci.areas.evidence import ShapeEvidence
 from mlci.evidence import Rates
 from mlci.grids import Grid
@@ -82,6 +85,28 @@ def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
     (told,) = (line for line in lines if line.startswith("area"))
     assert "of one or two shapes; expected overlap" in told
     assert any("forbidden somewhere with at least" in line for line in lines)
+
+
+def test_scores_of_some_demonstrations_are_those_of_them_alone(tmp_path: Path) -> None:
+    """Of four shapes two are likelier than one, as their prior is so."""
+    words = ["hypotheses.shape=[10,null]", "inference.shapes.count=4", "inference.shapes.samples=20"]
+    settings = read_config(composed(*TINY, *words))[0]
+    point = infer_point(settings, Store(tmp_path))
+    ways = ShapeWays.of(settings, point)
+    assert ways is not None
+    ways = replace(ways, truth=np.ones_like(ways.truth))  # so that recall is a share of points
+    alone = replace(
+        ways,
+        point=replace(point, demonstrations=[point.demonstrations[1]]),
+        evidence=ways.evidence.of_some([1]),
+    )
+    rows, share = ways.scores(np.array([1]), (0, 1))
+    np.testing.assert_equal(alone.scores(np.array([0]), (0, 1)), (rows, share))
+    assert 0 < rows["shapes"]["recall"] == pytest.approx(np.mean(share[ways.cell]))
+    belief = infer_area(alone.evidence, np.random.default_rng(0), sizes(settings))
+    assert len(belief.shapes) == 2
+    first, second = (ways.evidence.inside[:, i] for i in belief.shapes)
+    assert rows["likeliest"]["recall"] == pytest.approx(np.mean(first | second))
 
 
 def test_a_perfect_belief_finds_what_an_ideal_world_forbids() -> None:

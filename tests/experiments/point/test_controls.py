@@ -17,6 +17,8 @@ from experiments.point import controls, trials
 from experiments.point.inference import infer_point
 from experiments.tracking.store import Store
 from experiments.tracking.trees import canonical_json
+from mlci.evidence import Rates
+from mlci.forecasts import ForecastCurve, ForecastMap
 
 # The cart pushes no harder than 0.4 m/s^2, of 1.
 WEAK = ("truth=none", "truth.name=weak", "truth.controls=[{lower: [0.4], upper: [null]}]")
@@ -92,11 +94,39 @@ def test_wrong_answers_where_nothing_is_forbidden(tmp_path: Path) -> None:
     assert ranks["none"].eq(1).all()
 
 
+def test_ranks_of_controls_by_hand(tmp_path: Path) -> None:
+    """All demonstrations say the same: the truth comes after a range that is no part of it."""
+    settings = settings_of(*WEAK)
+    inferred = infer_point(settings, Store(tmp_path)).beliefs.controls
+    assert inferred is not None
+    names = inferred.hypotheses.names
+    alpha = {"control 0 above 0.4": 0.02, "control 0 below -0.4": 0.0}
+    same = np.tile([alpha.get(name, 1.0) for name in names], (len(inferred.names), 1))
+    known = dataclasses.replace(inferred, avoidance=same, applied=np.zeros_like(inferred.applied))
+    ranks = controls.control_tables(settings, known, np.random.default_rng(0))["control_ranks"]
+    one = ranks[ranks["demonstrations"] == 1]
+    error = settings.inference.model_error
+    of_truth, of_first = ((1 / ((1 - error) * a + error)) / 4 for a in (0.02, 0.0))
+    total = 1 + of_truth + of_first + 2 / 4  # as probable as nothing, all ranges together
+    assert one["first"].eq("control 0 below -0.4").all()
+    assert one["rank"].eq(2).all()
+    np.testing.assert_allclose(one["posterior"], of_truth / total)
+    np.testing.assert_allclose(one["none"], 1 / total)
+    assert of_first / total < 0.5
+    assert one[["true_first", "wrong", "wrong_sure"]].eq([0, 1, 0]).all(axis=None)
+    level = ForecastMap((ForecastCurve((1e-6, 1.0), 9, 99, 0.0, 0.0, 0.0, ceiling=0.6),))
+    mapped = dataclasses.replace(known, calibration=level, rates=Rates(0.0))
+    both = controls.control_tables(settings, mapped, np.random.default_rng(0))["control_ranks"]
+    plain = both[both["calibrated"] == 0].reset_index(drop=True)
+    pd.testing.assert_frame_equal(plain, ranks)  # with the model error, as without a map
+
+
 def test_chances_are_calibrated_by_demonstrators_whom_nothing_limits(tmp_path: Path) -> None:
     store, settings = Store(tmp_path), settings_of(*WEAK, "inference.calibrate=true")
     inferred = infer_point(settings, store).beliefs.controls
     assert inferred is not None
     assert inferred.calibration is not None
+    assert inferred.rates.model_error == 0  # the map has what takes its place
     other = settings_of("truth=none", "inference.calibrate=true")
     assert infer_point(other, store).beliefs.controls.calibration == inferred.calibration  # stored
     tables = controls.control_tables(settings, inferred, np.random.default_rng(0))

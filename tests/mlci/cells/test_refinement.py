@@ -114,6 +114,34 @@ def test_cells_that_are_not_visited_do_not_matter() -> None:
     assert 0.2 < np.mean(visited) < 0.95
 
 
+def test_importance_is_visits_times_the_change_to_the_neighbours() -> None:
+    """Cell by cell: the change of Z (alpha - alpha_0), beside what is larger of both Z."""
+    tree = goal_tree(mlci.Grid(PENDULUM.space, (7, 6)), [TASKS[0].goal], GRID.widths / 2)
+    task = TrajectoryDistribution.of_task(model(tree), TASKS[0], exact_ends=True)
+    matters, beside = importance(task, tree), neighbours(tree)
+    visits, alpha_0 = task.occupancies(), task.avoidance_probabilities()
+    levels = {t: alpha - alpha_0 for t, alpha in task.avoidance_levels()}
+    for cell, d in np.ndindex(tree.size, 2):
+        side = tree.sides[cell, d]
+        share = side / PENDULUM.space.bounds.widths[d]
+        expected = 100 * np.sum(visits[1:-1, cell]) * share**2
+        for t in range(1, task.steps):
+            if visits[t, cell] <= 1e-9:
+                continue
+            squares = []
+            for other in beside[cell, d]:
+                if other >= 0 and task.log_z[t, other] > -np.inf:
+                    rise = np.clip(task.log_z[t, other] - task.log_z[t, cell], -3, 3)
+                    most = max(rise, 0.0)
+                    there = np.exp(rise - most) * levels[t][other]
+                    slope = (there - np.exp(-most) * levels[t][cell]) / (
+                        (side + tree.sides[other, d]) / 2
+                    )
+                    squares.append(np.mean((side * slope) ** 2))
+            expected += visits[t, cell] * np.mean(squares or [0.0])
+        assert matters[cell, d] == pytest.approx(expected, rel=1e-9)
+
+
 def test_inference_on_cells_of_each_task() -> None:
     own = mlci.RefinedModel(model(), 150)
     prepared = mlci.prepare(own, TASKS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -79,6 +80,31 @@ def test_gains_where_chance_decides_are_ratios_of_causal_entropy() -> None:
     assert set_gains(problem).beside(members)[1] == -np.inf  # violated, and nobody breaks rules
 
 
+def test_where_chance_decides_a_ratio_takes_the_place_of_alpha() -> None:
+    problem = problem_of(grid_agent(slip=0.2), ROUND)
+    agent, path = problem.shown[0].agent, problem.shown[0]
+    of_path = TablePath(path.states, path.actions)
+    nominal = CausalEntropy(agent.table, 7, 0.9).log_probability(of_path)
+    found = single_avoidance(problem)[0]
+    for i in (5, 6, 9):
+        world = CausalEntropy(agent.under(np.arange(SIDE**2) == i).table, 7, 0.9)
+        ratio = nominal - world.log_probability(of_path)
+        assert ratio < 0
+        assert found[i] == pytest.approx(np.exp(ratio), abs=1e-12)
+    assert np.all(found[problem.violated[0]] == 1)
+
+
+def test_what_a_cell_alone_decides_is_no_forecast() -> None:
+    problem = problem_of(grid_agent(), ROUND)
+    log_alpha = np.log(np.full(SIDE**2, 0.5))
+    at_centres = np.where(np.arange(SIDE**2) == 6, -np.inf, log_alpha)
+    path = replace(
+        problem.shown[0], avoidance=lambda mask: log_alpha, between_cells=lambda mask: at_centres
+    )
+    found = single_avoidance(replace(problem, shown=(path,)))[0]
+    np.testing.assert_allclose(found, np.where(np.arange(SIDE**2) == 6, 1.0, 0.5))
+
+
 def test_gains_where_moves_are_certain_are_those_of_the_table() -> None:
     problem = problem_of(grid_agent(), ROUND)
     agent = problem.shown[0].agent
@@ -105,16 +131,17 @@ def test_the_paper_takes_the_likeliest_successor_for_the_only_one() -> None:
     np.testing.assert_allclose(slips[0], printed_avoidance(problem_of(grid_agent(), ROUND))[0])
 
 
-def test_the_penalty_map_balances_expected_and_shown_moves() -> None:
+@pytest.mark.parametrize(("spread", "within"), [(20.0, 0.02), (1.0, 0.05)])
+def test_the_penalty_map_balances_expected_and_shown_moves(spread: float, within: float) -> None:
     problem = problem_of(grid_agent(), ROUND)
-    agent, spread = problem.shown[0].agent, 20.0
+    agent = problem.shown[0].agent
     penalties = penalty_map(problem, iterations=500, spread=spread)
     expected = agent.table.crosses.T @ agent.with_penalties(penalties).flows
     shown = np.mean([problem.moves_inside(j) for j in range(3)], axis=0)
     gap = expected - shown - 1 / (spread * 3)
     assert np.all(gap[penalties <= 0] < 1e-3)
-    # Of what nobody enters the penalty rises ever more slowly, towards where 1 / 60 balances it.
-    np.testing.assert_allclose(gap[penalties > 0], 0, atol=0.02)
+    # Of what nobody enters the penalty rises ever more slowly, towards where the prior balances.
+    np.testing.assert_allclose(gap[penalties > 0], 0, atol=within)
     middle = np.isin(np.arange(SIDE**2), [5, 6, 9, 10])
     assert penalties[middle].sum() > penalties[~middle].sum()
 
@@ -134,13 +161,39 @@ def test_traces_by_hand() -> None:
     assert share[5] == pytest.approx(12 / 20, abs=4 * np.sqrt(0.24 / 1000))
 
 
+@pytest.mark.parametrize("slip", [0.0, 0.2])
+def test_demonstrations_of_a_task_count_alike_if_its_agents_are_two(slip: float) -> None:
+    one = problem_of(grid_agent(slip), ROUND)
+    *others, last = one.shown
+    two = replace(one, shown=(*others, replace(last, agent=replace(last.agent))))
+    assert [numbers for _, numbers in two.tasks] == [[0, 1], [2]]
+    for score in (visits, lambda it: penalty_map(it, iterations=5), density, single_avoidance):
+        np.testing.assert_allclose(score(two), score(one), atol=1e-9)
+    share = crossings(two, 200, np.random.default_rng(1))
+    np.testing.assert_allclose(share, crossings(one, 200, np.random.default_rng(2)), atol=0.2)
+
+
+def test_of_a_path_that_follows_no_moves_states_count_and_what_it_violates() -> None:
+    problem = problem_of(grid_agent(), ROUND)
+    violated = np.isin(np.arange(SIDE**2), [1, 6])  # 6 between two of its states
+    path = replace(problem.shown[0], states=np.array([0, 1, 1, 7]), actions=None, violated=violated)
+    counts = replace(problem, shown=(path,)).moves_inside(0)
+    assert np.flatnonzero(counts).tolist() == [0, 1, 6, 7]
+    assert counts[[0, 1, 6, 7]].tolist() == [1, 2, 1, 1]
+
+
 def test_neighbours_share_a_side_and_may_go_round() -> None:
     problem = problem_of(grid_agent(), ROUND)
     assert problem.neighbours[5].nonzero()[1].tolist() == [1, 4, 6, 9]
     assert problem.neighbours[0].nonzero()[1].tolist() == [1, 4]
     wrapped = Problem(problem.shown, (4, 4), problem.inside, problem.positions, (True, False))
     assert wrapped.neighbours[0].nonzero()[1].tolist() == [1, 4, 12]
-    assert -nearest(wrapped)[8] == 0
+    along = problem_of(grid_agent(), ROUND[:1])  # the first row, and the last column
+    assert -nearest(along)[8] == 2
+    assert nearest(replace(along, wraps=(True, False)))[[8, 12]].tolist() == [-2, -1]
+    narrow = Problem(problem.shown, (2, 8), problem.inside, problem.positions, (True, False))
+    assert narrow.neighbours[0].nonzero()[1].tolist() == [1, 8]
+    assert set(narrow.neighbours.data) == {1}  # two that go round share one side more than once
 
 
 def test_a_problem_needs_demonstrations_and_shapes_that_fit() -> None:
