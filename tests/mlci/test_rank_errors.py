@@ -8,7 +8,7 @@ from mlci.grids import Grid
 from mlci.inference import Inference
 from mlci.models import forecasters
 from mlci.preparation import infer, prepare
-from mlci.rank_errors import infer_until_settled, rank_errors
+from mlci.rank_errors import RankErrors, infer_until_settled, rank_errors, sampling_record
 from mlci.regions import Regions
 from mlci.sampled.distribution import SampledModel
 from mlci.sampling_errors import SamplingErrors
@@ -60,6 +60,42 @@ def test_errors_that_regions_share_leave_their_order_settled():
     shared = 0.05 * rng.uniform(-1, 1, (400, 2, 1))
     errors = rank_errors(inference_of(np.array([0.5, 0.51, 0.52]) + shared))
     assert np.all(errors.settled)
+
+
+@pytest.mark.parametrize(("swapped", "settled"), [(1, True), (4, False)])
+def test_the_middle_95_percent_of_ranks_count(swapped: int, settled: bool):
+    alpha = np.tile([0.2, 0.3, 0.9], (100, 2, 1))
+    alpha[:swapped] = [0.3, 0.2, 0.9]
+    inference = inference_of(alpha)
+    errors = rank_errors(inference)
+    np.testing.assert_array_equal(errors.settled, [settled, settled, True])
+
+
+def test_words_say_which_first_ranks_are_settled():
+    names, order = ["a", "b", "c"], np.array([2, 0, 1])
+    rank, nothing = np.array([2.0, 3.0, 1.0]), np.zeros(3)
+    for highest, words in (
+        ([2, 3, 1], "all 3 ranks are settled at 95 %"),
+        ([2, 4, 1], "ranks 1-2 are settled at 95 %; region b, at rank 3, may have any from 3 to 4"),
+        ([3, 3, 1], "rank 1 is settled at 95 %; region a, at rank 2, may have any from 2 to 3"),
+        (
+            [2, 3, 2],
+            "no rank is settled at 95 % from the first on; region c, at rank 1, may have any from "
+            "1 to 2",
+        ),
+    ):
+        assert RankErrors(rank, rank, np.array(highest), nothing).summary(order, names) == words
+
+
+def test_a_record_has_the_largest_error_and_what_any_demonstration_resolves():
+    rng = np.random.default_rng(0)
+    alpha = np.array([[0.5, 0.94, 0.5], [0.95, 0.95, 0.6]])
+    noise = np.array([[0.02, 0.05, 0.01], [0.05, 0.04, 0.03]])
+    inference = inference_of(alpha + noise * rng.choice([-1.0, 1.0], (400, 2, 3)))
+    regions = sampling_record(inference, rank_errors(inference))["regions"]
+    found = [regions[name] for name in inference.hypotheses.names]
+    assert [each["resolved"] for each in found] == [True, False, True]
+    assert [each["phi_error"] for each in found] == pytest.approx([0.05, 0.05, 0.03], rel=0.01)
 
 
 def test_an_inference_from_samples_tells_of_its_errors():

@@ -42,7 +42,9 @@ def test_limits_of_weights_are_those_of_rules_of_resampled_systems(made) -> None
         log_odds = np.log(p / (1 - p))
         found.append([*(log_odds[:-1] - log_odds[-1]), log_odds[-1]])
     spread = np.std(found, axis=0)
-    for column, limit in zip(("weight_low", "weight_high"), np.quantile(found, TAILS, axis=0), strict=True):
+    for column, limit in zip(
+        ("weight_low", "weight_high"), np.quantile(found, TAILS, axis=0), strict=True
+    ):
         np.testing.assert_array_less(np.abs(rule[column] - limit), 0.7 * spread)
 
 
@@ -80,11 +82,21 @@ def test_means_are_of_each_system_grid_and_time_step(made) -> None:
     assert len(systems) == 10
     assert set(systems["points"]) == {4}
     assert set(systems["over_claim"]) == {0.25}
-    assert set(systems["violation_distance"]) == {2.0}
+    for column in ("violation_distance", "violation_distance_low", "violation_distance_high"):
+        assert set(systems[column]) == {2.0}  # of those points that have one
     one = dynamics().query("system == 'S0' and cells == 400")["top"]
     row = systems.query("system == 'S0' and cells == 400").iloc[0]
     assert row["top"] == pytest.approx(one.mean())
     assert row["top_low"] <= row["top"] <= row["top_high"]
+
+
+def test_points_of_which_a_feature_is_not_known_have_no_part() -> None:
+    table = dynamics(2)
+    table.loc[3, "reach"] = np.nan
+    made = success_tables(table)
+    assert made["success_systems"]["points"].sum() == 16
+    assert "cell_3" not in set(made["success_forecasts"]["truth"])
+    assert len(made["success_forecasts"]) == 15
 
 
 def test_two_systems_have_no_third_to_choose_features_by() -> None:

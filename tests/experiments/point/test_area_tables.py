@@ -12,14 +12,17 @@ from tiny_point import TINY, composed
 from experiments.config.read import read_config
 from experiments.point.area_ceilings import ideal_world
 from experiments.point.area_shapes import sizes
+from experiments.point.area_tables import area_tables
 from experiments.point.inference import infer_point
 from experiments.point.run import run_point
 from experiments.point.shape_ways import ShapeWays, overlap_scores
+from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
 from mlci.areas.belief import infer_area
 from mlci.areas.evidence import ShapeEvidence
 from mlci.evidence import Rates
 from mlci.grids import Grid
+from mlci.metrics import random_subsets
 from mlci.spaces import Box, StateSpace
 
 
@@ -46,6 +49,25 @@ def test_tables_of_areas(tmp_path: Path) -> None:
     for size in (1, 3):
         assert cells[f"climb_{size}"].sum() == pytest.approx(climb[size])
     assert cells["climb_9"].isna().all()  # three were kept
+
+
+def test_each_subset_has_the_answer_of_its_own_demonstrations(tmp_path: Path) -> None:
+    """Each demonstration speaks for a slice of its own, the second for the wall."""
+    words = ["areas.subsets=3", "areas.demonstrations=[1]", "areas.log_odds=3"]
+    settings = read_config(composed(*TINY, *words))[0]
+    point = infer_point(settings, Store(tmp_path))
+    alpha, violated = np.ones((3, 10)), np.zeros((3, 10), dtype=bool)
+    alpha[np.arange(3), [5, 6, 7]] = 0.1
+    inference = replace(point.inference, avoidance=alpha, violated=violated)
+    tables = area_tables(settings, replace(point, inference=inference))
+    rng = stream(settings.seed, Purpose.AREAS, 0)
+    (subsets,) = random_subsets(3, 1, 3, rng)
+    single = tables["areas"].query("method == 'single'")
+    assert single["iou"].tolist() == (subsets[:, 0] == 1).astype(float).tolist()
+    assert 0 < single["iou"].sum() < 3
+    climb = tables["areas"].query("method == 'climb'")["regions"]
+    assert climb.mean() > 0
+    assert tables["area_map"]["climb_1"].sum() == pytest.approx(climb.mean())
 
 
 def test_a_truth_that_hypotheses_cover_in_part(tmp_path: Path) -> None:
@@ -89,7 +111,8 @@ def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
 
 def test_scores_of_some_demonstrations_are_those_of_them_alone(tmp_path: Path) -> None:
     """Of four shapes two are likelier than one, as their prior is so."""
-    words = ["hypotheses.shape=[10,null]", "inference.shapes.count=4", "inference.shapes.samples=20"]
+    words = ["hypotheses.shape=[10,null]"]
+    words += ["inference.shapes.count=4", "inference.shapes.samples=20"]
     settings = read_config(composed(*TINY, *words))[0]
     point = infer_point(settings, Store(tmp_path))
     ways = ShapeWays.of(settings, point)

@@ -50,6 +50,8 @@ def test_the_row_is_the_outlook_of_the_truth_and_its_ranks(store: Store) -> None
     assert row["demonstrations"] == 3
     assert row["top"] == pytest.approx((ranks["rank"] <= 5).mean())
     assert row["log_rank"] == pytest.approx(np.log(ranks["rank"]).mean())
+    assert row["first"] == pytest.approx((ranks["rank"] == 1).mean())
+    assert row["claim"] == pytest.approx(ranks["claim"].mean())
     assert row["out_of_reach"] == pytest.approx(1 - tables["trials"]["reachable"].mean())
     distance = tables["trials"]["violation_distance"]
     assert row["violation_distance"] == pytest.approx(distance.mean(), nan_ok=True)
@@ -66,6 +68,8 @@ def test_no_demonstration_has_a_part_in_what_is_known_before() -> None:
 
     before = inputs("")
     assert inputs("truth", cell=3) == inputs("grid", shape=(6, 6)) == before
+    assert inputs("demonstrations", keep=4, rule_breaking=0.2) == before
+    assert inputs("tasks", crossing=not one.tasks.crossing) == before
     assert inputs("demonstrations", pairs=7) == inputs("", seed=1, dt=1.0) == before
     assert inputs("demonstrations", iterations=3) != before
     assert inputs("tasks", upper=(1.0, 0.5)) != before

@@ -3,6 +3,8 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,6 +15,7 @@ from experiments.config.read import ConfigError, read_config, read_recorded_conf
 from experiments.console import answer_lines
 from experiments.infer import infer
 from experiments.page.words import answer_sentences
+from experiments.point import model_tables
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.model_choice import ModelChoice
 from experiments.tracking.store import Store
@@ -42,6 +45,33 @@ def test_a_sampled_point_has_the_tables_of_one_with_cells(tmp_path: Path) -> Non
     assert model["rank_lowest"] <= model["rank"] <= model["rank_highest"]
     done = sampled["trials"]["feasible"]
     assert np.all(sampled["trials"].loc[done, "final_state_error"] < 0.05)
+
+
+def test_changes_and_noise_of_a_shorter_step_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two tasks and two regions; the second task is out of reach of the longer step."""
+    few = SimpleNamespace(
+        errors=np.array([[0.3, 0.05], [0.1, 0.1]]), effective=np.array([10.0, 5.0])
+    )
+    prepared = [
+        SimpleNamespace(
+            avoidance=np.array(alpha), reachable=np.array(reached), sampling=few, tasks=(0, 1)
+        )
+        for alpha, reached in (
+            ([[0.5, 0.2], [1.0, 1.0]], [True, False]),
+            ([[0.3, 0.1], [0.4, 0.4]], [True, True]),
+        )
+    ]
+    asked: list[float] = []
+    monkeypatch.setattr(model_tables, "formed_model", lambda it, _: asked.append(it.dt))
+    monkeypatch.setattr(model_tables, "prepare", lambda *_, **__: prepared[len(asked) - 1])
+    settings = read_config(composed(*TINY, "models.steps=[0.5,1.0]", "models.tasks=2"))[0]
+    tasks = [SimpleNamespace(task=None)] * 2
+    point: Any = SimpleNamespace(demonstrations=tasks, numbers=np.array([4, 7]))
+    (row,) = model_tables.halving_table(settings, point).to_dict("records")
+    assert asked == [1.0, 0.5]
+    assert (row["step"], row["shorter"], row["trial"]) == (1.0, 0.5, 4)
+    assert row["change"] == pytest.approx((0.2**2 + 0.1**2) / 2)
+    assert row["noise"] == pytest.approx(2 * (0.3**2 - 0.1**2) / 2)  # 0.05 is within 1 / 10
 
 
 def test_an_answer_says_which_ranks_are_settled(tmp_path: Path) -> None:
