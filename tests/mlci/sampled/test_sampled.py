@@ -190,10 +190,22 @@ def test_sets_truths_and_crossings_are_those_of_the_weighted_paths():
     np.testing.assert_allclose(under.log_z - distribution.log_z, np.log(np.sum(weight[free])))
     expected = weight[free] @ entered[free] / np.sum(weight[free])
     np.testing.assert_allclose(under.violation_probabilities(), expected, atol=1e-12)
-    assert under.diagnosis.effective < distribution.diagnosis.effective
+    effective = np.sum(weight[free]) ** 2 / np.sum(np.square(weight[free]))
+    assert under.diagnosis.effective == pytest.approx(effective)
+    assert effective < distribution.diagnosis.effective
+    surely = ~entered.any(axis=0)  # what all paths avoid no path moves
+    assert surely.any()
+    assert not distribution.influences()[:, surely].any()
     drawn = np.mean(distribution.crossings(4000, np.random.default_rng(0)), axis=0)
     assert np.max(np.abs(drawn - phi)) < 0.04  # five standard errors of 4000 draws
     assert not distribution.under(np.ones(100, dtype=bool)).is_possible
+
+
+def test_a_goal_that_is_a_point_is_reached_within_the_tolerance_to_each_side():
+    goal = Box([1.0, -np.inf], [1.0, np.inf])
+    reached = replace(MODEL, tolerance=0.2).passage(replace(TASK, goal=goal)).goal
+    np.testing.assert_allclose(reached.lower, [0.8, -np.inf])
+    np.testing.assert_allclose(reached.upper, [1.2, np.inf])
 
 
 def test_nothing_is_unavoidable_only_because_no_sample_avoids_it():

@@ -34,6 +34,13 @@ def test_the_shape_of_a_pareto_tail_is_found(shape):
     assert np.mean(found) == pytest.approx(shape, abs=0.06)
 
 
+def test_the_shape_of_few_weights_is_drawn_towards_a_half():
+    # 20 weights are in the tail, and the prior counts as 10 of shape 0.5.
+    rng = np.random.default_rng(4)
+    found = [pareto_shape(-0.2 * np.log(rng.random(100))) for _ in range(100)]
+    assert np.mean(found) == pytest.approx((20 * 0.2 + 10 * 0.5) / 30, abs=0.1)
+
+
 def test_too_few_weights_tell_no_shape_and_equal_ones_have_no_tail():
     assert pareto_shape(np.append(np.zeros(10), np.full(90, -np.inf))) == np.inf
     assert pareto_shape(np.zeros(8)) == np.inf
