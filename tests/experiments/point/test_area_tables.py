@@ -117,7 +117,13 @@ def test_scores_of_some_demonstrations_are_those_of_them_alone(tmp_path: Path) -
     point = infer_point(settings, Store(tmp_path))
     ways = ShapeWays.of(settings, point)
     assert ways is not None
-    ways = replace(ways, truth=np.ones_like(ways.truth))  # so that recall is a share of points
+    violated = np.zeros((3, 4), dtype=bool)
+    violated[0] = True  # the first demonstration alone would exclude all shapes
+    ways = replace(
+        ways,
+        evidence=replace(ways.evidence, violated=violated),
+        truth=np.ones_like(ways.truth),  # so that recall is a share of points
+    )
     alone = replace(
         ways,
         point=replace(point, demonstrations=[point.demonstrations[1]]),
