@@ -45,15 +45,17 @@ def composed(*overrides: str, name: str = "config") -> dict[str, Any]:
 
 @functools.cache  # most tests begin with the same config
 def _composed(*overrides: str, name: str) -> dict[str, Any]:
-    return _composer(name).tree([quote_options(word) for word in overrides])
+    words = [quote_options(word) for word in overrides]
+    # A study's part of Hydra has to be there before its points are composed.
+    return _composer(name, *(word for word in words if word.startswith("experiment="))).tree(words)
 
 
 @functools.cache  # Hydra takes a tenth of a second for each choice of groups
-def _composer(name: str) -> Composer:
+def _composer(name: str, *study: str) -> Composer:
     register_plugins()
     with initialize_config_dir(str(CONF), **version_base()):
         loader = GlobalHydra.instance().config_loader()
-        return Composer(loader, loader.load_configuration(name, [], RunMode.MULTIRUN))
+        return Composer(loader, loader.load_configuration(name, [*study], RunMode.MULTIRUN))
 
 
 def planned(settings: Settings, results: Path) -> Point:
