@@ -71,7 +71,8 @@ def test_a_pendulum_that_goes_the_long_way_avoids_what_is_on_the_short_one() -> 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder with the forklift's module and config."""
-    (tmp_path / "forklift.py").write_text(blocks("conf/README.md", "python")[0])
+    (module,) = [block for block in blocks("conf/README.md", "python") if "Forklift" in block]
+    (tmp_path / "forklift.py").write_text(module)
     (config,) = [block for block in blocks("conf/README.md", "yaml") if "forklift" in block]
     (tmp_path / "conf" / "subject").mkdir(parents=True)
     (tmp_path / "conf" / "subject" / "forklift.yaml").write_text(config)
