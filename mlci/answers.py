@@ -252,10 +252,7 @@ def of_cells(
 def _(
     model: TabularModel, inference: Inference, hypotheses: Bools | None
 ) -> tuple[Bools, TieClass | None]:
-    cut = np.zeros(inference.hypotheses.lower.shape, dtype=bool)
-    if isinstance(model.grid, Grid):  # cells of varying size are cut where that matters
-        cut = cut_by(model.grid, inference.hypotheses)
-    return cut, tie_class(model, inference, hypotheses)
+    return cut_by(model.grid, inference.hypotheses), tie_class(model, inference, hypotheses)
 
 
 def unseen(inference: Inference) -> Ints:
@@ -268,12 +265,14 @@ def unseen(inference: Inference) -> Ints:
     return np.flatnonzero((expected < _RARELY_ENTERED) & ~np.any(inference.violated, axis=0))
 
 
-def cut_by(grid: Grid, regions: Regions) -> Bools:
-    """(C, n) whether a region has a side, within the bounds, that is no border of cells.
+def cut_by(grid: Any, regions: Regions) -> Bools:
+    """(C, n) whether a region has a side, within the bounds, that is no border of equal cells.
 
     The border of a shape that is not its own hull counts in each dimension that it depends on.
     """
     cut = np.zeros((len(regions), regions.space.dimension), dtype=bool)
+    if not isinstance(grid, Grid):
+        return cut
     origin, bounds = grid.corners[0][0], regions.space.bounds
     for side in (regions.lower, regions.upper):
         inside = np.isfinite(side) & (
@@ -282,10 +281,8 @@ def cut_by(grid: Grid, regions: Regions) -> Bools:
         cells = np.where(inside, (side - origin) / grid.widths, 0.0)
         cut |= np.abs(cells - np.round(cells)) > _SAME_SIDE
     for i in np.flatnonzero(~regions.are_boxes).tolist():
-        size, of_hull = (
-            volume_share(regions.space, shape)
-            for shape in (regions.shape(i), Cuboid(regions.box(i)))
-        )
+        shapes = regions.shape(i), Cuboid(regions.box(i))
+        size, of_hull = (volume_share(regions.space, shape) for shape in shapes)
         if size < of_hull * (1 - _SAME_SIDE):  # a side that is not along the axes
             cut[i] = np.isfinite(regions.lower[i])
     return cut

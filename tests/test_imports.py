@@ -140,7 +140,9 @@ MLCI = {
     "mlci.sampled.proposals": "mlci.sampled.local_policies",
     "mlci.sampled.adaptation": "mlci.sampled.proposals mlci.sampled.weights",
     "mlci.sampled.diagnosis": "mlci.spaces",
-    "mlci.sampled.distribution": "mlci.sampled.adaptation mlci.sampled.diagnosis",
+    "mlci.sampled.model_check": "mlci.spaces",
+    "mlci.sampled.distribution": "mlci.sampled.adaptation mlci.sampled.diagnosis "
+    "mlci.sampled.model_check",
     "mlci.models": "mlci.cells.refined_model mlci.evidence mlci.maxent "
     "mlci.sampled.distribution mlci.sampling_errors",
     "mlci.preparation": "mlci.inference mlci.models",

@@ -59,6 +59,8 @@ SHORT = [
     (r"^(.*run\.py .*)", r"\1 workers=1"),
     # Two hundred simulated demonstrators a command are for the tests of calibration.
     (r"^(?!.*inference)(.*(run|infer)\.py .*)", r"\1 inference.calibrate=false"),
+    # Nor are minutes of sampled paths for the tasks that may be recorded next.
+    (r"^(.*model=sampled.*)", r"\1 sampled.samples=200 sampled.restarts=1 next_tasks.count=0"),
 ]
 # Commands that run here, as starting each of them takes a second or two.
 MAINS = {

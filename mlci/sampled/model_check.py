@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from mlci.sampled.distribution import SampledModel
 
 _POSITIVE = ("dt", "temperature", "samples", "substeps", "restarts", "tolerance", "replicates")
 _COUNTS = ("samples", "substeps", "restarts", "seed", "replicates")
 
 
-def check_model(model: SampledModel) -> None:
+def check_model(model: Any) -> None:
     """Raise where it does not.
 
     Raises:
