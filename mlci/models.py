@@ -123,7 +123,7 @@ def _of_refined_cells(
 
 def _refined_forecast(model: RefinedModel, task: Task, **ends: bool) -> Forecast:
     """The forecast of a task on its own cells."""
-    return forecast_of(model.distribution(task, **ends))
+    return forecast_of(distribution_of(model, task, **ends))
 
 
 @forecasters.register

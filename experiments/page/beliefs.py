@@ -14,7 +14,7 @@ from mlci.answers import listed
 from mlci.areas.belief import AreaBelief
 from mlci.sets.posterior import SetPosterior
 
-_NAMED = 5  # regions, or ranges
+_AREAS, _NAMED = 3, 5  # parts of an area; regions, or ranges
 
 
 def belief_sentences(beliefs: Beliefs) -> list[str]:
@@ -37,7 +37,9 @@ def _area_sentences(belief: AreaBelief | None) -> list[str]:
     ]
     space = belief.raster.space
     sentences += [
-        f"Likely inside what is avoided: {bounds(part.hull, space)}." for part in belief.parts[:3]
+        f"The area that fits it best lies at {bounds(part.hull, space)}; avoided somewhere there: "
+        f"at least {of_100(part.probability)}."
+        for part in belief.parts[:_AREAS]
     ]
     if belief.parts:
         sentences.append(

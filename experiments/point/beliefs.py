@@ -58,7 +58,6 @@ def recorded_beliefs(
     sets = set_belief(settings, model, demonstrations, inference, np.random.default_rng(0))
     controls = area = None
     if isinstance(model, TabularModel):
-        begin("weighing controls")
         controls = recorded_controls(settings, model, demonstrations)
         begin("weighing areas of one or two shapes")
         area = area_belief(settings, model, demonstrations, inference, np.random.default_rng(0))

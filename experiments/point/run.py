@@ -15,7 +15,6 @@ from experiments.console import (
     measure_lines,
     trial_lines,
 )
-from experiments.point.area_shapes import area_table
 from experiments.point.dynamics_tables import dynamics_table
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
@@ -62,8 +61,6 @@ def run_point(
     begin("measuring")
     measures = measure_point(settings, inferred)
     tables = point_tables(settings, inferred, measures, result.misfit)
-    if inferred.beliefs.area is not None:
-        tables["area"] = area_table(inferred.beliefs.area)
     if settings.transfer.strengths:
         begin("with stronger and weaker controls")
         tables |= transfer_tables(settings, inferred, store)

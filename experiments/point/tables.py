@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
+from experiments.point.area_shapes import area_table
 from experiments.point.area_tables import area_tables
 from experiments.point.baseline_tables import baseline_table
 from experiments.point.belief_counts import belief_counts
@@ -57,8 +58,8 @@ def point_tables(
         trajectories; and the TRUTH_TABLES `attempts`, a row a start and goal pair, `paths`,
         `dimensions` of the state, and `regions` of the truth. If asked for, `sets` and
         `set_marginals`; `calibration`, and `evidence` and `forecasts` where these are calibrated;
-        `baselines`, `next_task`, `soft`, `controls` and `control_ranks`, `resolution`, `areas` and
-        `area_map`, and those of `model_tables`.
+        `baselines`, `next_task`, `soft`, `controls` and `control_ranks`, `resolution`, `area`,
+        `areas` and `area_map`, and those of `model_tables`.
     """
     inference = point.inference
     covered = inference.hypotheses.inside(settings.constraint)
@@ -97,6 +98,8 @@ def point_tables(
         tables |= model_tables(settings, point)
     if settings.baselines.paths:
         tables["baselines"] = baseline_table(settings, point)
+    if point.beliefs.area is not None:
+        tables["area"] = area_table(point.beliefs.area)
     if settings.areas.subsets:
         tables |= area_tables(settings, point)
     if settings.next_task.repetitions:

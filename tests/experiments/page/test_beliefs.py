@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from page_answers import CIRCLE, answer_of
 
@@ -10,7 +12,9 @@ from experiments.page.beliefs import belief_sentences
 from experiments.page.document import page
 from mlci.actuation.inference import ControlInference
 from mlci.actuation.ranges import ControlRanges
+from mlci.areas.belief import AreaBelief
 from mlci.evidence import Rates
+from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.sets.chains import ChainCheck
 from mlci.sets.posterior import SetPosterior
@@ -64,6 +68,19 @@ def test_controls_are_told_with_what_is_assumed() -> None:
     applied = belief_sentences(Beliefs(NAMES, None, controls([0.2, 0.8], [True, True]), None))
     assert applied[0].startswith("Controls: no range stands out")
     assert applied[0].endswith("How likely that is: 100 of 100.")
+
+
+def test_an_area_is_told_by_its_parts_and_by_how_far_it_can_be_trusted() -> None:
+    raster = Grid(CIRCLE, (4, 4))
+    area = np.arange(16) == 5
+    sizes, chance = np.array([0.25, 0.25, 0.5]), np.where(area, 0.6, 0.1)
+    belief = AreaBelief(raster, sizes, chance, area, 0.4, (0,), 0.3)
+    none, part, overlap = belief_sentences(Beliefs(NAMES, area=belief))
+    assert none.endswith("nothing is avoided, 25.0 of 100.")
+    assert part.endswith("avoided somewhere there: at least 60.0 of 100.")
+    assert overlap.endswith("are expected to share 0.40 of all that is in either.")
+    nowhere = replace(belief, area=np.zeros(16, bool), overlap=np.nan)
+    assert len(belief_sentences(Beliefs(NAMES, area=nowhere))) == 1
 
 
 def test_beliefs_stand_below_the_answer_and_are_text() -> None:

@@ -117,6 +117,7 @@ _OF_POINTS |= {"ranks.subsets", "rollouts"}
     "words",
     [
         *("inference.exact_ends=false", "transition.samples=3", "soft.weights=[1.0]"),
+        "inference.shapes.count=10",
         *("next_task.repetitions=1", "baselines.paths=1", "calibration.sets=1"),
     ],
 )

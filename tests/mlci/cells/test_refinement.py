@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mlci
+from mlci.answers import answer
 from mlci.baselines import occupancy
 from mlci.cells.box_tree import BoxTree
 from mlci.cells.goal_cells import goal_tree
@@ -155,6 +156,20 @@ def test_inference_on_cells_of_each_task() -> None:
     outside = mlci.Task(np.array([1.0, 9.0]), TASKS[0].goal, 3.0)
     with pytest.raises(ValueError, match="outside the state space"):
         mlci.prepare(own, [outside])
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_an_answer_is_told_of_refined_cells(refined: mlci.TabularModel, own: bool) -> None:
+    """Whether cells cut a hypothesis is not told of cells that differ in size."""
+    cells = mlci.RefinedModel(model(), 150) if own else refined
+
+    path = np.linspace(TASKS[0].start, TASKS[0].goal.lower, 31)
+    shown = mlci.Demonstration.from_path(path, 0.1)
+    inference = mlci.infer(cells, [shown])
+    result = answer(cells, [shown], inference)
+    assert not result.cut.any()
+    assert result.temperature == 1.0
+    assert (result.ties is None) == own
 
 
 def test_what_cannot_be_refined_is_refused() -> None:
