@@ -6,10 +6,9 @@ READY := .venv/ready
 # project's modules again takes two seconds longer to start, and each study starts several.
 export PYTHONDONTWRITEBYTECODE :=
 
-# The studies that the report needs, the longest first, and all others; the experiment `smoke` repeats
+# The studies of the paper's claims, the longest first, and all others; the experiment `smoke` repeats
 # the paper's.
-STUDIES := telescope paper sensitivity readings calibration rule_breaking wrong_model \
-	control_noise in_cell
+STUDIES := telescope paper sensitivity calibration in_cell
 OTHERS := $(filter-out $(STUDIES) smoke,$(basename $(notdir $(wildcard conf/experiment/*.yaml))))
 
 # Two studies run at a time, each on half of the cores: while one plans its points, waits for what they
@@ -27,7 +26,7 @@ help: ## list the targets
 install: .venv/installed ## install what running needs, without tools; EXTRAS="parquet excel" reads more formats
 	@echo "installed: try $(BIN)/python experiments/infer.py demonstrations=FOLDER"
 
-paper: $(READY) ## run what is missing of the report's studies, draw their figures, write the report
+paper: $(READY) ## run what is missing of the paper's studies, draw their figures, write the report
 	@$(MAKE) --no-print-directory --keep-going --jobs=2 $(STUDIES:%=study-%)
 	@$(MAKE) --no-print-directory figures
 
