@@ -104,8 +104,8 @@ WORLDS = {
         source=_SOURCE + f"Constraint Inference: section V, {name}; 20 x 20 cells, 9 actions, "
         "0.25 s, 100 hypotheses",
         setting=_SETTING.format(tasks="random safe states of at most 2 rad/s"),
-        differs="demonstrations by iLQR behind a safety filter of ours, with its margin; 20 of "
-        "them in place of 65",
+        differs="demonstrations by iLQR behind a safety filter of ours, with its margin; theirs "
+        "are 65",
     )
     for name in ("C1", "C2")
 } | {
@@ -115,7 +115,7 @@ WORLDS = {
         source=_SOURCE + "Constraint Inference: section VI; 2500 cells, 15 actions, 100 hypotheses",
         setting=_SETTING.format(tasks="random postures, from rest"),
         differs="range, units and truth are ours, since the paper gives none; the truth lies "
-        "across hypotheses, two of which it covers; steps of 1 s, so that cells can be left; 20 "
-        "demonstrations in place of 5",
+        "across hypotheses, two of which it covers; steps of 1 s, so that cells can be left; their "
+        "demonstrations are 5",
     )
 }
