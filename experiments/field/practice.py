@@ -14,7 +14,7 @@ import numpy as np
 
 from experiments.field.entries import Case, World
 from experiments.field.worlds import mazes, pendulums, plane, walls
-from experiments.field.worlds.grids import grid_case, successors
+from experiments.field.worlds.grids import entering, grid_case, successors
 from mlci.regions import Regions
 from mlci.rivals.agent import Agent
 from mlci.shapes.balls import Ball
@@ -81,7 +81,7 @@ def slipping(layout: Callable[..., Bools], seed: int, count: int) -> Case:
 def certain(layout: Callable[..., Bools], seed: int, count: int) -> Case:
     """Eight certain moves of cost 2 nat in 9 x 9 states, from corner to corner."""
     meant = successors((9, 9))
-    regions = walls.entering(meant, np.arange(81)[:, None])
+    regions = entering(meant, np.arange(81)[:, None])
     table = Table.from_arrays(meant, -2.0, start=0, goals=80, regions=regions)
     agent = Agent(table, 24, final=table.goals)
 
