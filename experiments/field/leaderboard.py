@@ -73,7 +73,9 @@ def _best(table: pd.DataFrame, methods: list[str]) -> str:
 
 
 def _verdict(gap: dict[str, float]) -> str:
-    """Who is ahead, if the interval of the difference tells."""
+    """Who is ahead, if the interval of the difference tells; one seed has none."""
+    if gap["seeds"] < 2:
+        return "unknown"
     if gap["mean"] == 0 or not gap["lower"] * gap["upper"] > 0:
         return "level"
     return "ahead" if gap["mean"] > 0 else "behind"

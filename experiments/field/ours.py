@@ -11,17 +11,14 @@ from functools import lru_cache
 import numpy as np
 
 from experiments.field.entries import Answer, Method
-from mlci.evidence import (
-    Rates,
-    posterior,
-)
+from mlci.evidence import Rates, posterior
 from mlci.rivals.problem import Problem
 from mlci.rivals.set_gains import set_gains, single_avoidance
 from mlci.rule_breaking import estimate_rule_breaking
 from mlci.sets.posterior import SetPosterior, SetPrior
 from mlci.sets.sampling import sample_sets
 from mlci.sets.search import search
-from mlci.spaces import Floats
+from mlci.spaces import Bools, Floats
 
 RATES = Rates(model_error=0.1)  # the default of `mlci.infer`
 LEAST = 0.1  # [nat a demonstration], the stop of Scobee and Sastry
@@ -53,7 +50,7 @@ def greedy(problem: Problem, _rng: np.random.Generator) -> Answer:
 
 
 def sets(problem: Problem, _rng: np.random.Generator) -> Answer:
-    """The posterior over sets of regions: what is likelier forbidden than not."""
+    """The posterior over sets of regions: those that it expects to overlap most with the truth."""
     return _of_sets(_belief(problem, _rates(problem)))
 
 
@@ -98,10 +95,22 @@ def _belief(problem: Problem, rates: Rates) -> SetPosterior:
     return sample_sets(gains, _prior(problem), rng, chains=2, steps=STEPS)
 
 
-def _of_sets(sample: SetPosterior) -> Answer:
-    """What is likelier forbidden than not."""
-    marginal = sample.marginal
-    return Answer(np.where(marginal > 0, marginal, -np.inf), marginal > 0.5, marginal)
+def _of_sets(belief: SetPosterior) -> Answer:
+    """Marginals, and the regions that the posterior expects to overlap most with what is true."""
+    marginal = belief.marginal
+    return Answer(np.where(marginal > 0, marginal, -np.inf), most_overlap(belief), marginal)
+
+
+def most_overlap(belief: SetPosterior) -> Bools:
+    """(C,) as many of the first regions by marginals as have the largest expected IoU.
+
+    None are taken if it is likelier that there is none than any number of them would overlap.
+    """
+    order = np.argsort(-belief.marginal, kind="stable")
+    both = np.cumsum(belief.members[:, order], axis=1)  # (B, C), of each sampled set
+    either = np.arange(1, len(order) + 1) + both[:, -1:] - both
+    expected = np.append(belief.none, belief.probability @ (both / either))
+    return np.isin(np.arange(len(order)), order[: int(np.argmax(expected))])
 
 
 METHODS = {
@@ -109,7 +118,12 @@ METHODS = {
     "ours: greedy": Method(
         greedy, "this project: `mlci.select_regions`, stop of Scobee and Sastry"
     ),
-    "ours: sets": Method(sets, "this project: `mlci.infer_sets`"),
+    "ours: sets": Method(
+        sets,
+        "this project: `mlci.infer_sets`, with a prior by the border",
+        "takes the regions of the largest expected IoU, where others take what is likelier than "
+        "not",
+    ),
     "ours: with rates": Method(
         with_rates,
         "this project: sets, rate of rule breaking estimated",

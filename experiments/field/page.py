@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from experiments.field.catalog import Catalog
@@ -137,7 +136,8 @@ _STANDINGS = """Two methods of ours, settled beforehand in worlds that are none 
 (`experiments/field/practice.py`): `ours: sets`, against the best of the others that are told
 nothing, and `ours: ranked`, against the best of the others that are told how many hypotheses are
 true. Mean difference of IoU over seeds, with its 95 % interval. The best other is picked in each
-world by these same runs, which favours it.
+world by these same runs, which favours it. *Level* is where the interval holds 0: with few seeds
+it is wide, and says little.
 """
 
 
@@ -159,16 +159,19 @@ def _of_world(board: pd.DataFrame, world: str, methods: list[str], told: set[str
 
 
 def _stands(stands: pd.DataFrame) -> list[str]:
-    """In how many worlds ours is not behind, by IoU, and a table with a row a world and kind."""
+    """In how many worlds ours is ahead by IoU, and a table with a row a world and kind."""
     said, rows = [], []
     table = stands[stands["score"] == "iou"]
     for (kind, ours), group in table.groupby(["kind", "ours"], sort=False):
-        level = int(np.sum(group["verdict"] != "behind"))
-        said.append(f"`{ours}` ({kind}) is ahead or level in {level} of {len(group)} worlds.")
+        counts = group["verdict"].value_counts()
+        where = [
+            f"{v} in {counts[v]}" for v in ("ahead", "level", "behind", "unknown") if v in counts
+        ]
+        said.append(f"- `{ours}`, {kind}, is {', '.join(where)} of {len(group)} worlds.")
     for row in table.to_dict("records"):
         gap = f"{row['ahead']:+.2f} ({row['lower']:+.2f} to {row['upper']:+.2f})"
         rows.append([row[k] for k in ("world", "kind", "ours", "other")] + [gap, row["verdict"]])
-    head = ["world", "methods that are", "ours", "best other", "ours less it", "ours is"]
+    head = ["world", "methods", "ours", "best other", "ours less it", "ours is"]
     return ["\n".join(said) + "\n", _table(head, rows)]
 
 

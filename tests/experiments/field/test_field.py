@@ -15,13 +15,15 @@ from experiments.field.catalog import load
 from experiments.field.contest import contest
 from experiments.field.entries import Answer
 from experiments.field.leaderboard import interval, standings
-from experiments.field.ours import NEVER, ranked, sets
+from experiments.field.ours import NEVER, most_overlap, ranked, sets
 from experiments.field.scores import SCORES, score
 from experiments.field.worlds import mazes, plane, scobee, walls
 from experiments.field.worlds.grids import MOVES, entering, grid_case, slippery, successors
 from mlci.evidence import Rates
 from mlci.rivals.agent import Agent
 from mlci.rivals.set_gains import set_gains, single_avoidance
+from mlci.sets.posterior import SetPosterior
+from mlci.spaces import Bools
 from mlci.worlds.tables import Table
 
 README = Path(__file__).parents[3] / "experiments" / "field" / "README.md"
@@ -204,7 +206,26 @@ def test_intervals_and_standings_by_hand() -> None:
     assert untold["ahead"] == pytest.approx(0.2)
     assert (told["ours"], told["other"], told["verdict"]) == ("ours: ranked", "told", "behind")
     assert told["ahead"] == pytest.approx(-0.05)
+    alone = standings(pd.DataFrame(rows[::3]), "iou", {"told", "ours: ranked"})
+    assert alone["verdict"].tolist() == ["unknown", "unknown"]  # one seed has no interval
     assert standings(pd.DataFrame(rows[6:]), "iou", {"told"}).empty  # of ours, greedy alone
+
+
+def test_the_expected_overlap_is_largest() -> None:
+    members = np.array([[0, 0, 0, 0], [1, 0, 0, 0], [1, 1, 0, 0], [0, 1, 1, 1]], dtype=bool)
+    firsts = np.array([[0, 0, 0, 0], [1, 0, 0, 0], [1, 1, 0, 0], [1, 1, 1, 0], [1, 1, 1, 1]]) > 0
+    for probability in ([0.5, 0.3, 0.1, 0.1], [0.3, 0.4, 0.2, 0.1], [0, 0.3, 0.5, 0.2]):
+        belief = SetPosterior(members, np.array(probability), np.zeros(4), np.zeros(4))
+
+        def overlap(chosen: Bools, belief: SetPosterior = belief) -> float:
+            each = [
+                np.sum(true & chosen) / np.sum(true | chosen) if np.any(true | chosen) else 1.0
+                for true in members
+            ]
+            return float(np.dot(belief.probability, each))
+
+        best = max(firsts, key=overlap)
+        assert most_overlap(belief).tolist() == best.tolist()
 
 
 def test_the_inside_that_nobody_can_enter_is_forbidden_with_its_border() -> None:
