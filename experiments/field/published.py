@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.field.leaderboard import interval
-from experiments.field.methods import greedy
+from experiments.field.ours import greedy
 from experiments.field.worlds import scobee
 
 # Share of the selected constraints that are not true, by number of demonstrations: Scobee and

@@ -21,6 +21,7 @@ HORIZON, PI, FREE = 5.0, np.pi, np.inf
 SWING, LEG = Pendulum(), TelescopingPendulum()
 C1 = box([PI, 0.0], [1.2 * PI, 1.2])
 C2 = box([1.6 * PI, 0.0], [1.8 * PI, 1.2])
+PRACTICE = box([0.4 * PI, 0.0], [0.6 * PI, 1.2])  # of no world of the benchmark
 PAIN = box([-0.3, -FREE, 7.2, -FREE], [0.3, FREE, 8.2, FREE])
 
 
@@ -35,7 +36,7 @@ def cells(system: System, forbidden: Box) -> Cells:
 @cache
 def safe_set(world: str) -> tuple[SafeSet, float]:
     """The states that can keep out of a truth, and the filter's margin."""
-    system, forbidden, *_ = _WORLDS[world]
+    system, forbidden, *_ = TASKS[world]
     truth = Regions.from_boxes(system.space, [forbidden])
     if system is SWING:
         safe = solve_safe_set(system, Grid(system.space, (121, 121)), truth)
@@ -50,7 +51,7 @@ def make(world: str, seed: int, count: int) -> Case:
     Raises:
         ValueError: fewer were kept than are to be shown.
     """
-    system, forbidden, starts, offsets, restarts = _WORLDS[world]
+    system, forbidden, starts, offsets, restarts = TASKS[world]
     safe, margin = safe_set(world)
     truth = Regions.from_boxes(system.space, [forbidden])
     keep_out = SafetyFilter(system, safe, 0.02, margin)
@@ -84,7 +85,9 @@ def make(world: str, seed: int, count: int) -> Case:
 _POSTURES = box([-0.8, 0.0, 5.3, 0.0], [0.8, 0.0, 10.7, 0.0])
 _ANY_SPEED = box([-0.1, -FREE, -0.3, -FREE], [0.1, FREE, 0.3, FREE])
 _ANYWHERE = box([0.0, -2.0], [2 * PI, 2.0])
-_WORLDS = {
+# System, what is forbidden, where tasks start, offsets of goals, restarts.
+TASKS = {
+    "practice": (SWING, PRACTICE, _ANYWHERE, None, 3),
     "pendulum C1": (SWING, C1, _ANYWHERE, None, 3),
     "pendulum C2": (SWING, C2, _ANYWHERE, None, 3),
     "telescoping pendulum": (LEG, PAIN, _POSTURES, _ANY_SPEED, 8),
@@ -101,8 +104,8 @@ WORLDS = {
         source=_SOURCE + f"Constraint Inference: section V, {name}; 20 x 20 cells, 9 actions, "
         "0.25 s, 100 hypotheses",
         setting=_SETTING.format(tasks="random safe states of at most 2 rad/s"),
-        differs="demonstrations by iLQR behind a safety filter of ours, with its margin; 20 of "
-        "them in place of 65",
+        differs="demonstrations by iLQR behind a safety filter of ours, with its margin; theirs "
+        "are 65",
     )
     for name in ("C1", "C2")
 } | {
@@ -112,7 +115,7 @@ WORLDS = {
         source=_SOURCE + "Constraint Inference: section VI; 2500 cells, 15 actions, 100 hypotheses",
         setting=_SETTING.format(tasks="random postures, from rest"),
         differs="range, units and truth are ours, since the paper gives none; the truth lies "
-        "across hypotheses, two of which it covers; steps of 1 s, so that cells can be left; 20 "
-        "demonstrations in place of 5",
+        "across hypotheses, two of which it covers; steps of 1 s, so that cells can be left; their "
+        "demonstrations are 5",
     )
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from experiments.field.entries import Case, World
@@ -23,7 +25,6 @@ ELLIPSES = Regions.from_shapes(
     [Ball([-1.0, 0.6], [0.9, 0.6]), Ball([1.1, -0.7], [0.6, 1.0])],
     ("wide", "high"),
 )
-BETWEEN = Cells(POINT, ELLIPSES, (24, 24), 7, 0.5, (12, 12), temperature=0.1)
 
 SQUARE = StateSpace(box([0.0, 0.0], [1.0, 1.0]), np.zeros(2, dtype=bool), ("x", "y"), ("m", "m"))
 HAND = FunctionSystem(lambda x, u: (u[..., 0], u[..., 1]), SQUARE, box([-1.0, -1.0], [1.0, 1.0]))
@@ -36,9 +37,9 @@ DURATION, SAMPLE = 2.0, 0.02  # [s] of a reach, and between samples
 NOISE, CLEARANCE = 0.15, 0.04  # deviation of a velocity as a share of it, [m] kept on average
 
 
-def between(seed: int, count: int) -> Case:
-    """Optimal paths, of tasks whose straight way would enter an ellipse."""
-    safe = solve_safe_set(POINT, Grid(POINT.space, (61, 61)), ELLIPSES)
+def between(truth: Regions, seed: int, count: int) -> Case:
+    """Optimal paths, of tasks whose straight way would enter what is forbidden."""
+    safe = solve_safe_set(POINT, Grid(POINT.space, (61, 61)), truth)
     keep_out = SafetyFilter(POINT, safe, 0.05, 0.04, 0.15)
     kept: list[Demonstration] = []
     tried = dropped = 0
@@ -47,7 +48,7 @@ def between(seed: int, count: int) -> Case:
             POINT,
             safe,
             POINT.space.bounds,
-            trials=2 * count,
+            trials=6 * count,  # all at once is the quickest, and mostly enough
             seed=seed,
             horizon=5.0,
             dt=0.05,
@@ -55,11 +56,12 @@ def between(seed: int, count: int) -> Case:
             margin=0.04,
         )
         tried += len(trials)
-        if through := crossing(POINT, trials, ELLIPSES, dt=0.05, iterations=30):
-            tries = demonstrate(POINT, through, ELLIPSES, keep_out, dt=0.05, iterations=30)
+        if through := crossing(POINT, trials, truth, dt=0.05, iterations=30):
+            tries = demonstrate(POINT, through, truth, keep_out, dt=0.05, iterations=30)
             kept += [each.demonstration for each in tries if each.outcome is Outcome.KEPT]
             dropped += sum(each.outcome is not Outcome.KEPT for each in tries)
-    return BETWEEN.case(kept[:count], dropped)
+    cells = Cells(POINT, truth, (24, 24), 7, 0.5, (12, 12), temperature=0.1)
+    return cells.case(kept[:count], dropped)
 
 
 def around(seed: int, count: int) -> Case:
@@ -112,7 +114,7 @@ def _minimum_jerk(time: Floats) -> Floats:
 
 WORLDS = {
     "two ellipses": World(
-        make=between,
+        make=partial(between, ELLIPSES),
         demonstrations=16,
         source="our own, of the kind that work on continuous constraints demonstrates with",
         setting="tasks of 5 s; a point that moves as it is told, temperature 0.1, reward "

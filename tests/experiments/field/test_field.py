@@ -15,10 +15,16 @@ from experiments.field.catalog import load
 from experiments.field.contest import contest
 from experiments.field.entries import Answer
 from experiments.field.leaderboard import interval, standings
+from experiments.field.ours import NEVER, most_overlap, ranked, sets
 from experiments.field.scores import SCORES, score
 from experiments.field.worlds import mazes, plane, scobee, walls
-from experiments.field.worlds.grids import MOVES, slippery, successors
-from mlci.rivals.set_gains import single_avoidance
+from experiments.field.worlds.grids import MOVES, entering, grid_case, slippery, successors
+from mlci.evidence import Rates
+from mlci.rivals.agent import Agent
+from mlci.rivals.set_gains import set_gains, single_avoidance
+from mlci.sets.posterior import SetPosterior
+from mlci.spaces import Bools
+from mlci.worlds.tables import Table
 
 README = Path(__file__).parents[3] / "experiments" / "field" / "README.md"
 QUICK = ["ours: single", "paper as printed", "visitation difference", "middle"]
@@ -46,7 +52,7 @@ def test_the_example_of_the_readme_is_short_and_leads_to_a_leaderboard(
     assert main([*arguments, "--methods", *QUICK, "--out", str(folder)]) == 0
     assert str(folder / "LEADERBOARD.md") in capsys.readouterr().out
     page = (folder / "LEADERBOARD.md").read_text()
-    assert "| row | mine | 6 moves | nothing is published |" in page
+    assert "| row | mine | 10 | 6 moves | nothing is published |" in page
     assert (folder / "leaderboard.png").read_bytes().startswith(b"\x89PNG")
     board = pd.read_csv(folder / "tables" / "leaderboard.csv").set_index(["method", "score"])
     assert board.loc[("middle", "iou"), "mean"] == 1  # the middle one is forbidden
@@ -100,6 +106,8 @@ def test_recordings_of_a_folder_are_a_world(tmp_path: Path) -> None:
     world = load((tmp_path,)).worlds[f"recorded: {tmp_path.name}"]
     case = world.make(0, 20)
     assert len(case.problem.shown) == 2
+    runs = contest(tmp_path / "r", [f"recorded: {tmp_path.name}"], ["uniform"], [0], (tmp_path,))
+    assert runs["demonstrations"].tolist() == [2]  # as many as there are, of 20 that are asked for
     assert np.flatnonzero(case.cover > 0.1).tolist() == [44, 45, 54, 55]
     assert not case.problem.violated[:, case.cover > 0.1].any()
     up, down = (each.violated for each in case.problem.shown)  # across y = 0.75 or 0.25 halfway
@@ -186,15 +194,54 @@ def test_the_cells_of_a_continuous_world_can_do_what_people_did() -> None:
 
 def test_intervals_and_standings_by_hand() -> None:
     assert interval(np.array([1.0, 2.0, 3.0]))["upper"] == pytest.approx(2 + 4.302653 / np.sqrt(3))
+    means = {"ours: sets": 0.5, "ours: ranked": 0.55, "ours: greedy": 0.9}
+    means |= {"other": 0.3, "worse": 0.2, "told": 0.6}
     rows = [
         {"world": "w", "method": method, "seed": seed, "iou": iou + 0.01 * seed}
-        for method, iou in (("ours: a", 0.5), ("other", 0.3), ("told", 0.6))
+        for method, iou in means.items()
         for seed in range(3)
     ]
-    (row,) = standings(pd.DataFrame(rows), "iou", {"told"}).to_dict("records")
-    assert (row["ours"], row["rival"], row["scorer"]) == ("ours: a", "other", "told")
-    assert row["ahead_of_rival"] == pytest.approx(0.2)
-    assert (row["verdict_rival"], row["verdict_scorer"]) == ("ahead", "behind")
+    untold, told = standings(pd.DataFrame(rows), "iou", {"told", "ours: ranked"}).to_dict("records")
+    assert (untold["ours"], untold["other"], untold["verdict"]) == ("ours: sets", "other", "ahead")
+    assert untold["ahead"] == pytest.approx(0.2)
+    assert (told["ours"], told["other"], told["verdict"]) == ("ours: ranked", "told", "behind")
+    assert told["ahead"] == pytest.approx(-0.05)
+    alone = standings(pd.DataFrame(rows[::3]), "iou", {"told", "ours: ranked"})
+    assert alone["verdict"].tolist() == ["unknown", "unknown"]  # one seed has no interval
+    assert standings(pd.DataFrame(rows[6:]), "iou", {"told"}).empty  # of ours, greedy alone
+
+
+def test_the_expected_overlap_is_largest() -> None:
+    members = np.array([[0, 0, 0, 0], [1, 0, 0, 0], [1, 1, 0, 0], [0, 1, 1, 1]], dtype=bool)
+    firsts = np.array([[0, 0, 0, 0], [1, 0, 0, 0], [1, 1, 0, 0], [1, 1, 1, 0], [1, 1, 1, 1]]) > 0
+    for probability in ([0.5, 0.3, 0.1, 0.1], [0.3, 0.4, 0.2, 0.1], [0, 0.3, 0.5, 0.2]):
+        belief = SetPosterior(members, np.array(probability), np.zeros(4), np.zeros(4))
+
+        def overlap(chosen: Bools, belief: SetPosterior = belief) -> float:
+            each = [
+                np.sum(true & chosen) / np.sum(true | chosen) if np.any(true | chosen) else 1.0
+                for true in members
+            ]
+            return float(np.dot(belief.probability, each))
+
+        best = max(firsts, key=overlap)
+        assert most_overlap(belief).tolist() == best.tolist()
+
+
+def test_the_inside_that_nobody_can_enter_is_forbidden_with_its_border() -> None:
+    meant = successors((5, 5))
+    table = Table.from_arrays(meant, -1.0, 0, 24, entering(meant, np.arange(25)[:, None]))
+    block = [6, 7, 8, 11, 12, 13, 16, 17, 18]
+    case = grid_case(Agent(table, 8, final=table.goals), (5, 5), block, 0, 20)
+    rng = np.random.default_rng(0)
+    gain = set_gains(case.problem, Rates(NEVER)).gain
+    hollow = case.truth & (np.arange(25) != 12)
+    assert gain(hollow) == pytest.approx(gain(case.truth))  # the middle explains nothing more
+    assert sets(case.problem, rng).chosen[12]
+    told = ranked(case.problem, rng)
+    assert told.chosen is None
+    assert score(case, told, rng)["iou"] == 1
+    assert np.all(told.scores[~case.problem.feasible] == -np.inf)
 
 
 def test_files_that_are_no_entries_are_told(tmp_path: Path) -> None:
@@ -286,3 +333,37 @@ def test_answers_that_say_nothing_are_refused(
     for wrong in (["--workers", "0"], ["--out", str(path)]):
         with pytest.raises(SystemExit):
             main(wrong)
+
+
+def test_a_method_that_fails_is_named_and_the_others_go_on(
+    mine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    broken = tmp_path / "broken.py"
+    rule = "scores = -np.abs(place - place.mean())"
+    assert rule in mine.read_text()
+    broken.write_text(mine.read_text().replace(rule, "scores = place[99]"))
+    arguments = ["--add", str(broken), "--worlds", "row", "--seeds", "2", "--workers", "1"]
+    out = ["--out", str(tmp_path / "r")]
+    assert main([*arguments, "--methods", "middle", "uniform", *out]) == 2
+    told = capsys.readouterr().err
+    assert "method middle in world row, seed 0 fails: " in told
+    assert "; so do 1 more" in told
+    assert "broken.py, line" in told
+    assert len(told.splitlines()) == 1
+    assert len(list((tmp_path / "r").rglob("*.json"))) == 2  # of uniform, with both seeds
+    broken.write_text(mine.read_text().replace("[3], seed", "[1, 2], seed"))  # no way
+    load.cache_clear()
+    assert main([*arguments, "--methods", "uniform", "--out", str(tmp_path / "s")]) == 2
+    assert "world row, seed 0 fails: ValueError: " in capsys.readouterr().err
+
+
+def test_two_workers_write_what_one_does(mine: Path, tmp_path: Path) -> None:
+    tables = []
+    for workers in ("1", "2"):
+        arguments = ["--add", str(mine), "--worlds", "row", "maze 3", "--demonstrations", "3"]
+        arguments += ["--methods", "ours: greedy", "sampled crossings", "--seeds", "2"]
+        assert main([*arguments, "--workers", workers, "--out", str(tmp_path / workers)]) == 0
+        tables.append(without_time(tmp_path / workers / "tables" / "runs.csv"))
+    pd.testing.assert_frame_equal(*tables)
+    assert set(tables[0]["demonstrations"]) == {3}
+    assert "| maze 3 | our own | 3 | horizon" in (tmp_path / "1" / "LEADERBOARD.md").read_text()
