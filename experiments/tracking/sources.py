@@ -53,6 +53,12 @@ def source_hash(modules: Iterable[str], alone: Iterable[str] = ()) -> str:
         modules: their full names.
         alone: more modules, which count without what they import.
     """
+    return _hash(frozenset(modules), frozenset(alone))
+
+
+@cache
+def _hash(modules: frozenset[str], alone: frozenset[str]) -> str:
+    """The same, remembered: every point of a sweep asks for that of its system."""
     sources: dict[str, str] = {}
     outside: set[str] = set()
     waiting = list(modules)

@@ -31,6 +31,8 @@ def flatten(tree: Any, prefix: str = "") -> dict[str, Any]:
 
 def plain(value: Any) -> Any:
     """Dataclasses, mappings and tuples as dicts and lists, ready for JSON."""
+    if isinstance(value, str | int | float | None):  # most values are: no other question of them
+        return value
     if dataclasses.is_dataclass(value):
         fields = dataclasses.fields(value)
         return {field.name: plain(getattr(value, field.name)) for field in fields}

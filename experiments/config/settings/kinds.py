@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from mlci.region_sizes import LARGEST_POWER
 
-STRICT = ConfigDict(extra="forbid")  # a key that no field has is an error
+STRICT = ConfigDict(extra="forbid", defer_build=True)  # a key that no field has is an error
 
 MULTIPLE_OF_PI = (
     r"\s*([+-]?)\s*(?:(\d+(?:\.\d+)?)(?:\s*/\s*(\d+))?)?\s*\*?\s*pi\s*(?:/\s*(\d+))?\s*"

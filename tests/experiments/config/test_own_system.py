@@ -31,7 +31,7 @@ MAINS = {
     "mlci-figures": figures.main,
     "mlci-results": results.main,
 }
-CACHES = (sources._read_source, sources._module_names, sources._neighbours)
+CACHES = (sources._hash, sources._read_source, sources._module_names, sources._neighbours)
 SMALL = ["grid.shape=[8,8,8]"]
 SMOKE = {
     "mlci-run": [

@@ -162,6 +162,7 @@ def test_the_source_hash_is_the_same_from_memory_and_parses_nothing(
 
     def now() -> str:
         monkeypatch.setattr(sources, "_MEMORY", memory())
+        sources._hash.cache_clear()
         sources._read_source.cache_clear()
         return sources.source_hash(["experiments.point.run"])
 
