@@ -10,8 +10,8 @@ import numpy as np
 from experiments.console import bounds, probability
 from experiments.terminal import entry, table_lines
 from mlci.actuation.inference import ControlInference
-from mlci.answers import listed
 from mlci.areas.belief import AreaBelief
+from mlci.misfit import listed
 from mlci.sets.posterior import SetPosterior
 
 _AREAS, _MARGINALS = 3, 5  # that are printed

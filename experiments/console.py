@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 
 from experiments.terminal import WIDTH, entry, table_lines, words
-from mlci.answers import Answer, listed
+from mlci.answers import Answer
 from mlci.demonstrations import Task
 from mlci.diagnosis import Diagnosis
 from mlci.inference import Inference
+from mlci.misfit import listed
 from mlci.recordings.plausibility import Plausibility
 from mlci.spaces import Box, StateSpace
 

@@ -188,6 +188,7 @@ def _answer(
         inference,
         round_horizon=True,
         exact_ends=exact_ends,
+        simulated=() if calibration is None else calibration.excess,
         temperature=temperature,
         doubts=doubts,
         weights=recorded_weights(settings, model, demonstrations, inference),
@@ -200,7 +201,7 @@ def _answer_lines(
 ) -> list[str]:
     """The answer, where to read on if it is doubtful, and how forecasts were calibrated."""
     lines = list(answer_lines(result, settings.top))
-    if np.any(result.misfit.is_rare):
+    if result.misfit.warnings(result.inference.names):
         lines += entry("see", ON_WRONG_MODELS)
     if calibration is not None:
         lines += entry("calibration", calibration.summary())

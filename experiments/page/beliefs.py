@@ -10,8 +10,8 @@ from experiments.belief_lines import Beliefs, controls_assumed
 from experiments.console import bounds
 from experiments.page.words import of_100
 from mlci.actuation.inference import ControlInference
-from mlci.answers import listed
 from mlci.areas.belief import AreaBelief
+from mlci.misfit import listed
 from mlci.sets.posterior import SetPosterior
 
 _AREAS, _NAMED = 3, 5  # parts of an area; regions, or ranges

@@ -171,7 +171,10 @@ def _score_row(scores: ForecastScores) -> list[float]:
 
 def _arrays(calibration: Calibration) -> dict[str, np.ndarray]:
     """A calibration as arrays, for the store."""
-    arrays = {"tasks": np.array([calibration.tried, calibration.used])}
+    arrays = {
+        "tasks": np.array([calibration.tried, calibration.used]),
+        "excess": calibration.excess,
+    }
     if calibration.out_of_reach is not None:
         arrays["out_of_reach"] = np.array(calibration.out_of_reach)
     arrays |= map_arrays(calibration.map)
@@ -194,6 +197,7 @@ def _calibration(arrays: Mapping[str, np.ndarray]) -> Calibration:
         before=before,
         after=after,
         out_of_reach=None if out_of_reach is None else float(out_of_reach),
+        excess=arrays["excess"],
     )
 
 

@@ -54,7 +54,7 @@ def answer(
     return Answer(
         inference,
         support(inference),
-        Misfit(np.zeros(count, int), np.zeros(count), np.ones(count), np.ones(count)),
+        Misfit(np.zeros(count, int), np.zeros(count), *[np.ones(count)] * 4),
         np.arange(0),
         np.zeros((len(hypotheses), space.dimension), bool),
         1.0,
