@@ -69,7 +69,7 @@ class Calibration:
             f"over {self.used} tasks like these, forecasts are off by {self.before.off_by:.3f} "
             f"before and {self.after.off_by:.3f} after (Brier score {self.before.brier.mean:.3f} "
             f"and {self.after.brier.mean:.3f}); one demonstration brings at most "
-            f"{self.map.largest_gain:.2f} nat"
+            f"{self.map.largest_gain:.2f} nat for a region"
         )
 
 
