@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.console import bounds, probability
-from experiments.terminal import entry, table_lines
+from experiments.terminal import counted, entry, table_lines
 from mlci.actuation.inference import ControlInference
-from mlci.answers import listed
 from mlci.areas.belief import AreaBelief
+from mlci.misfit import listed
 from mlci.sets.posterior import SetPosterior
 
 _AREAS, _MARGINALS = 3, 5  # that are printed
+_FEW_SHAPES = 300  # below a fifth of the 1500 that studies draw
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,9 @@ def area_lines(belief: AreaBelief | None) -> Iterator[str]:
     if belief is None:
         return
     parts, space = belief.parts, belief.raster.space
+    if not np.isfinite(belief.overlap):
+        yield from entry("area", f"of one or two shapes: {all_entered(belief)}")
+        return
     yield from entry(
         "area",
         f"of one or two shapes; expected overlap with what is forbidden, if anything is, "
@@ -72,6 +76,26 @@ def area_lines(belief: AreaBelief | None) -> Iterator[str]:
             f"{probability(part.probability)}",
             hang=2,
         )
+    if concern := area_concern(belief):
+        yield from entry("warning", concern)
+
+
+def all_entered(belief: AreaBelief) -> str:
+    """What is said where demonstrations exclude every shape."""
+    return (
+        f"none, since demonstrations enter each of the {counted(belief.drawn, 'shape')} that were "
+        "drawn; draw more (inference.shapes.count) or smaller ones (inference.shapes.smallest)"
+    )
+
+
+def area_concern(belief: AreaBelief) -> str | None:
+    """Why an area is not to be relied on; None if nothing speaks against it."""
+    if belief.drawn >= _FEW_SHAPES:
+        return None
+    return (
+        f"{counted(belief.drawn, 'shape')} were drawn, too few to tell an area: others would tell "
+        "another one. Raise inference.shapes.count; 1500 are many where two dimensions are bounded"
+    )
 
 
 def control_lines(controls: ControlInference | None, top: int) -> Iterator[str]:
@@ -108,7 +132,8 @@ def controls_assumed(controls: ControlInference) -> str:
     people = (
         "chances as the tabular agent's"
         if controls.calibration is None
-        else "chances calibrated by a simulated demonstrator whom nothing limits"
+        else "chances calibrated by a simulated demonstrator whom nothing limits, so that one "
+        f"demonstration brings at most {controls.calibration.largest_gain:.2f} nat for a range"
     )
     return (
         "at most one range is forbidden, and no region; controls that are not recorded come from "

@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 
 from experiments.terminal import WIDTH, entry, table_lines, words
-from mlci.answers import Answer, listed
+from mlci.answers import Answer
 from mlci.demonstrations import Task
 from mlci.diagnosis import Diagnosis
 from mlci.inference import Inference
+from mlci.misfit import listed
 from mlci.recordings.plausibility import Plausibility
 from mlci.spaces import Box, StateSpace
 
@@ -264,12 +265,16 @@ def _side(box: Box, d: int) -> str:
 
 def measure_lines(summary: pd.Series, ranks: pd.DataFrame, top: int) -> Iterator[str]:
     """The study's three measures."""
-    yield from entry(
-        "measures",
+    measured = (
         f"final-state error {summary['final_state_error']:.3f}; violation distance "
         f"{summary['violation_distance']:.2f} each (floor {summary['violation_floor']:.2f}), "
-        f"{summary['violation_distance_pooled']:.2f} pooled",
+        f"{summary['violation_distance_pooled']:.2f} pooled"
     )
+    nothing = (
+        "no final-state error nor violation distance, since rollouts=0 or the tabular agent can "
+        "reach no goal under the truth"
+    )
+    yield from entry("measures", measured if summary["feasible"] else nothing)
     if ranks["rank"].isna().all():
         yield from entry("", "no region is forbidden, so there is no truth to rank")
         return

@@ -89,9 +89,11 @@ def infer(settings: RecordedSettings) -> int:
     begin("reading files")
     readings = read_recordings(settings)
     demonstrations, problems, notes = readings
-    calibration = None
-    if settings.inference.calibrate and demonstrations:
-        calibration = _exported_calibration(settings, notes)
+    calibration, exported = None, _exported(settings)
+    if settings.inference.calibrate and demonstrations and exported is not None:
+        calibration = exported_calibration(settings, exported)
+        remark = _NOT_EXPORTED if calibration is None else _EXPORTED
+        notes.append(Remark(shown_path(exported.folder), remark))
     begin("")
     for problem in problems:
         complain(f"not used: {problem}")
@@ -110,7 +112,7 @@ def infer(settings: RecordedSettings) -> int:
         store = Store(results / "store")
         calibration = recorded_calibration(settings, model, demonstrations, store)
     result = _answer(settings, model, demonstrations, calibration, summary(checks))
-    beliefs = recorded_beliefs(settings, model, demonstrations, result.inference)
+    beliefs = recorded_beliefs(settings, model, demonstrations, result.inference, exported)
     begin("drawing the map")
     # All is saved before it is printed, in case nobody reads on.
     folder = _save(settings, demonstrations, problems, result, checks, beliefs)
@@ -139,16 +141,12 @@ def infer(settings: RecordedSettings) -> int:
     return FAILED if problems else DONE
 
 
-def _exported_calibration(settings: RecordedSettings, notes: list[Remark]) -> Calibration | None:
-    """The calibration that comes with a point's exported demonstrations, if these are ranked."""
+def _exported(settings: RecordedSettings) -> Store | None:
+    """The calibration beside a point's exported demonstrations, if these alone are ranked."""
     given = settings.demonstrations
     paths = [given] if isinstance(given, str) else given
     folder = user_path(paths[0]) / CALIBRATION
-    if len(paths) != 1 or not folder.is_dir():
-        return None
-    calibration = exported_calibration(settings, Store(folder))
-    notes.append(Remark(shown_path(folder), _NOT_EXPORTED if calibration is None else _EXPORTED))
-    return calibration
+    return Store(folder) if len(paths) == 1 and folder.is_dir() else None
 
 
 def _answer(
@@ -188,6 +186,7 @@ def _answer(
         inference,
         round_horizon=True,
         exact_ends=exact_ends,
+        simulated=() if calibration is None else calibration.excess,
         temperature=temperature,
         doubts=doubts,
         weights=recorded_weights(settings, model, demonstrations, inference),
@@ -200,7 +199,7 @@ def _answer_lines(
 ) -> list[str]:
     """The answer, where to read on if it is doubtful, and how forecasts were calibrated."""
     lines = list(answer_lines(result, settings.top))
-    if np.any(result.misfit.is_rare):
+    if result.misfit.warnings(result.inference.names):
         lines += entry("see", ON_WRONG_MODELS)
     if calibration is not None:
         lines += entry("calibration", calibration.summary())

@@ -21,10 +21,10 @@ from experiments.terminal import complain, entry, table_lines
 from experiments.tracking.environment import environment
 from experiments.tracking.files import csv_bytes, digest, json_bytes, replace_file
 from experiments.tracking.trees import canonical_json, plain
-from mlci.answers import listed
 from mlci.credible_sets import most_probable
 from mlci.evidence import Rates
 from mlci.json_numbers import finite
+from mlci.misfit import listed
 from mlci.recordings.recording import Remark, shown_path
 from mlci.recordings.table_paths import read_table_paths
 from mlci.sets.search import Selection

@@ -70,7 +70,8 @@ def main() -> int:
         0; 2 if something that was asked for is not there.
     """
     options = _parser().parse_args()
-    results = Path(os.path.realpath(os.path.expanduser(options.results or default_results())))
+    folder = options.results or _results_of_path(options) or default_results()
+    results = Path(os.path.realpath(os.path.expanduser(folder)))
     if isinstance(sys.stdout, io.TextIOWrapper):  # names of files need not suit a terminal
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -92,6 +93,15 @@ def main() -> int:
         complain(reason(error))
         return 2
     return 0
+
+
+def _results_of_path(options: argparse.Namespace) -> Path | None:
+    """The folder of results that a point lies in, where it is named by its folder."""
+    for name in ("point", "name", "one"):
+        path = Path(os.path.realpath(os.path.expanduser(getattr(options, name, ""))))
+        if path.parent.name == "points" and path.is_dir():
+            return path.parent.parent
+    return None
 
 
 def _parser() -> argparse.ArgumentParser:

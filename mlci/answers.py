@@ -8,6 +8,7 @@ from functools import cached_property, singledispatch
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mlci.demonstrations import Demonstration
 from mlci.grids import Grid
@@ -136,6 +137,7 @@ class Answer:
                     "regions_p": finite(self.misfit.count_p[j]),
                     "distance": float(self.misfit.distance[j]),
                     "distance_p": finite(self.misfit.distance_p[j]),
+                    "unlike_p": finite(self.misfit.unlike_p[j]),
                 }
                 for j, name in enumerate(inference.names)
             ],
@@ -154,15 +156,8 @@ class Answer:
     @property
     def warnings(self) -> list[str]:
         """What a reader should know before believing the answer, those of the recordings first."""
-        phrases, names = (
-            [*self.doubts, *self.inference.warnings],
-            np.array(self.inference.names, dtype=object),
-        )
-        if rare := names[self.misfit.is_rare].tolist():
-            phrases.append(
-                f"the model finds {len(rare)} of {len(names)} demonstrations nearly "
-                f"impossible (p < 0.01; by chance 1 in 50): {listed(rare)}"
-            )
+        phrases = [*self.doubts, *self.inference.warnings]
+        phrases += self.misfit.warnings(self.inference.names)
         if self.temperature_estimate is not None:
             phrases += self.temperature_estimate.warnings
         if len(self.unseen):
@@ -193,6 +188,7 @@ def answer(
     round_horizon: bool = False,
     exact_ends: bool = True,
     samples: int = SAMPLES,
+    simulated: ArrayLike = (),
     temperature: TemperatureEstimate | None = None,
     doubts: Sequence[str] = (),
     weights: Sequence[WeightEstimate] = (),
@@ -208,6 +204,7 @@ def answer(
         round_horizon: as of `infer`.
         exact_ends: as of `infer`.
         samples: as of `misfit`.
+        simulated: as of `misfit`: `Calibration.excess`, where there is a calibration.
         temperature: what `mlci.temperature.estimate_temperature` made of the demonstrations.
         doubts: about the recordings themselves.
         weights: what `mlci.soft.weight.estimate_weights` made of the demonstrations.
@@ -227,6 +224,7 @@ def answer(
             inference.violated,
             hypotheses=hypotheses,
             samples=samples,
+            simulated=simulated,
         ),
         unseen=unseen(inference),
         cut=cut,
@@ -292,9 +290,3 @@ def _shared(size_prior: float) -> str:
     """How the prior goes to regions."""
     power = f"by size to the power of {-size_prior:g}" if size_prior else "equally"
     return f"the rest shared {power}"
-
-
-def listed(names: Sequence[str], most: int = 8) -> str:
-    """The first names, and how many more there are."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more

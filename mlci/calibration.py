@@ -11,7 +11,7 @@ What this assumes is that people move like the demonstrator: as far as they do n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,12 +20,13 @@ from mlci.crossings import ANY, Crossing, crossed
 from mlci.demonstrations import REACHED, Demonstration, Task
 from mlci.forecast_scores import ForecastScores, score_forecasts
 from mlci.forecasts import ForecastMap, fit_map, is_possible
+from mlci.misfit import excess_of
 from mlci.models import Model
 from mlci.preparation import prepare
 from mlci.region_sizes import region_sizes
 from mlci.regions import Regions, as_mask
 from mlci.similar_tasks import similar_demonstrations
-from mlci.spaces import Bools, Box
+from mlci.spaces import Bools, Box, Floats
 from mlci.tabular import Progress
 
 FEWEST = 20  # demonstrations from which a map can be fitted and judged
@@ -43,6 +44,8 @@ class Calibration:
         after: scores there of the map of the first half.
         out_of_reach: share of the regions out of the model's reach that were crossed nevertheless,
             in both halves; None if there are none.
+        excess: (used,) by how much the violation distance (11) of each demonstration is above its
+            floor, see `mlci.misfit`.
     """
 
     tried: int
@@ -51,6 +54,7 @@ class Calibration:
     before: ForecastScores | None = None
     after: ForecastScores | None = None
     out_of_reach: float | None = None
+    excess: Floats = field(default_factory=lambda: np.zeros(0))
 
     def summary(self) -> str:
         """What was found, in a line or two."""
@@ -65,7 +69,7 @@ class Calibration:
             f"over {self.used} tasks like these, forecasts are off by {self.before.off_by:.3f} "
             f"before and {self.after.off_by:.3f} after (Brier score {self.before.brier.mean:.3f} "
             f"and {self.after.brier.mean:.3f}); one demonstration brings at most "
-            f"{self.map.largest_gain:.2f} nat"
+            f"{self.map.largest_gain:.2f} nat for a region"
         )
 
 
@@ -180,10 +184,11 @@ def calibrate_on(
     paths = [each.states for each in demonstrations]
     times = [each.times for each in demonstrations]
     hits = crossed(regions, paths, times, crossing)[can]
+    excess = excess_of(1 - alpha, hits)
     open_pairs = ~(certain_by_ends(regions, tasks) | prepared.decided_by_cell)[can]
     counts = open_pairs & is_possible(alpha)
     if not (counts[:half].any() and counts[half:].any()):
-        return Calibration(tried, used)
+        return Calibration(tried, used, excess=excess)
     first = fit_map(alpha[:half], hits[:half], sizes, counts[:half])
     calibrated = first.avoidance(alpha[half:], sizes)
     beyond = open_pairs & ~counts
@@ -194,6 +199,7 @@ def calibrate_on(
         score_forecasts(alpha[half:], hits[half:], counts[half:]),
         score_forecasts(calibrated, hits[half:], counts[half:]),
         float(np.mean(hits[beyond])) if beyond.any() else None,
+        excess,
     )
 
 

@@ -1,17 +1,28 @@
-"""Misfit: how improbable the tabular model finds the set of regions that a demonstration crosses.
+"""Misfit: how unlike what is expected the set of regions is that a demonstration crosses.
 
 Two numbers describe it: how many regions the demonstration violates, and sum_i |Phi_i - D_i|, its
-distance from what is expected (11). Both are compared with trajectories that are drawn from the
-maximum entropy distribution of the same task, without a constraint.
+distance from what is expected (11). They are compared with two kinds of paths:
+
+* trajectories that are drawn from the maximum entropy distribution of the same task. These tell
+  how well the model describes the demonstration. Optimal paths are no such draws: on a coarse model
+  many of them are rare among these;
+* simulated demonstrations without a constraint (`mlci.calibration`). These tell whether the
+  demonstration is unlike what the demonstrator does in such tasks, however well the model fits him.
+  What is compared is the excess, the distance less its floor sum_i 2 Phi_i (1 - Phi_i), which is
+  its mean for the model's own. Among n of them and the demonstration every rank of its excess is
+  equally probable, so that p = (1 + number at least as large) / (1 + n) is below 0.01 for one in
+  100 at most.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 
 import numpy as np
+import scipy  # loads scipy.special when it is first used
+from numpy.typing import ArrayLike
 
 from mlci.maxent import TrajectoryDistribution
 from mlci.merged_moves import MergedMoves
@@ -20,7 +31,8 @@ from mlci.sampled.distribution import SampledDistribution
 from mlci.spaces import Bools, Floats, Ints
 
 SAMPLES = 249  # of each task: p of two sides is then 2 / 250 at least, which is below RARE
-RARE = 0.01  # a p below it is a warning
+RARE = 0.01  # a p below it is rare
+_ALARM = 0.05  # probability at most, that right demonstrations give a warning
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,17 +45,66 @@ class Misfit:
         count_p: (N,) p of so few or so many regions, two-sided; NaN where the model cannot do the
             task.
         distance_p: (N,) p of a distance at least as large; NaN likewise.
+        excess: (N,) the distance less its floor sum_i 2 Phi_i (1 - Phi_i).
+        unlike_p: (N,) p of an excess at least as large, among simulated demonstrations; NaN where
+            there are too few of these for a p below 0.01, or the model cannot do the task.
     """
 
     count: Ints
     distance: Floats
     count_p: Floats
     distance_p: Floats
+    excess: Floats
+    unlike_p: Floats
 
     @property
     def is_rare(self) -> Bools:
-        """(N,) whether one of both p is below 0.01; about one in 50 of the model's own is."""
+        """(N,) whether `count_p` or `distance_p` is below 0.01; one in 50 of the model's own is."""
         return (self.count_p < RARE) | (self.distance_p < RARE)
+
+    @property
+    def is_unlike(self) -> Bools:
+        """(N,) whether `unlike_p` is below 0.01; one in 100 of simulated demonstrations is."""
+        return self.unlike_p < RARE
+
+    def warnings(self, names: Sequence[str]) -> list[str]:
+        """What is doubtful of demonstrations (N,) with these names, in words.
+
+        Where simulated demonstrations are known, it is that more are unlike them than chance
+        explains: in one of 20 sets of such demonstrations at most. Else it is what the model finds
+        rare, which says little of optimal paths.
+        """
+        known = np.isfinite(self.unlike_p)
+        if not known.any():
+            rare, count = np.flatnonzero(self.is_rare).tolist(), len(names)
+            if not len(rare):
+                return []
+            return [
+                f"{len(rare)} of {count} demonstrations cross other regions than the model's own "
+                f"trajectories do (p < {RARE}; one in 50 of these does so). Optimal paths often do "
+                "so too: only a calibration tells whether that is unusual: "
+                + listed([names[j] for j in rare])
+            ]
+        unlike, count = np.flatnonzero(self.is_unlike).tolist(), int(np.sum(known))
+        chance = scipy.special.bdtrc(len(unlike) - 1, count, RARE) if len(unlike) else 1.0
+        if chance > _ALARM:
+            return []
+        return [
+            f"{len(unlike)} of {count} demonstrations cross other regions than simulated "
+            f"demonstrations without a constraint do (p < {RARE} each; so many by chance in "
+            f"{chance:.1%} of such sets): " + listed([names[j] for j in unlike])
+        ]
+
+
+def listed(names: Sequence[str], most: int = 8) -> str:
+    """The first names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def excess_of(phi: Floats, violated: Bools) -> Floats:
+    """(N,) how far sum_i |Phi_i - D_i| is above its floor, for Phi (N, C) and D (N, C)."""
+    return np.asarray(np.sum(np.abs(phi - violated) - 2 * phi * (1 - phi), axis=1))
 
 
 def misfit(
@@ -53,6 +114,7 @@ def misfit(
     *,
     hypotheses: Bools | None = None,
     samples: int = SAMPLES,
+    simulated: ArrayLike = (),
 ) -> Misfit:
     """Compare demonstrations with trajectories drawn for their tasks; the same each time.
 
@@ -63,11 +125,17 @@ def misfit(
         hypotheses: (C',) mask of the C regions among the model's; None where these are all.
         samples: trajectories drawn for each task. p = (1 + number at least as extreme) / (1 +
             samples), which is never 0; with none, p is NaN.
+        simulated: (n,) excess of simulated demonstrations, as of `mlci.Calibration`.
     """
     count, distance = np.sum(violated, axis=1), np.sum(np.abs(phi - violated), axis=1)
-    count_p, distance_p = np.full((2, len(violated)), np.nan)
-    for j, distribution in enumerate(distributions if samples else ()):
+    excess, others = excess_of(phi, violated), np.asarray(simulated, dtype=float)
+    count_p, distance_p, unlike_p = np.full((3, len(violated)), np.nan)
+    for j, distribution in enumerate(distributions):
         if not distribution.is_possible:
+            continue
+        if len(others) >= 1 / RARE:
+            unlike_p[j] = _tail(others >= excess[j] - 1e-9)
+        if not samples:
             continue
         crossed = sample_crossings(distribution, samples, np.random.default_rng(0))
         drawn = crossed if hypotheses is None else crossed[:, hypotheses]
@@ -75,7 +143,7 @@ def misfit(
         tails = [_tail(counts >= count[j]), _tail(counts <= count[j])]
         count_p[j] = min(1.0, 2 * min(tails))
         distance_p[j] = _tail(distances >= distance[j] - 1e-9)  # a tie, but for rounding
-    return Misfit(count, distance, count_p, distance_p)
+    return Misfit(count, distance, count_p, distance_p, excess, unlike_p)
 
 
 @singledispatch

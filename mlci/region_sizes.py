@@ -10,7 +10,7 @@ import numpy as np
 
 from mlci.regions import Regions
 from mlci.shapes.membership import volume_share
-from mlci.spaces import Floats
+from mlci.spaces import Bools, Floats
 
 _LEAST = 1e-15  # share of a volume: its largest power is still a number
 LARGEST_POWER = 20.0  # a region of half the size is then a million times as probable
@@ -34,7 +34,8 @@ def weights_by_size(regions: Regions, power: float) -> Floats | None:
     probable, and the weights None.
 
     Raises:
-        ValueError: a power below 0, or above `LARGEST_POWER`.
+        ValueError: a power below 0, or above `LARGEST_POWER`; or a region within the bounds that is
+            too small to have a size.
     """
     if not 0 <= power <= LARGEST_POWER:
         raise ValueError(
@@ -43,5 +44,20 @@ def weights_by_size(regions: Regions, power: float) -> Floats | None:
         )
     if power == 0:
         return None
-    sizes = region_sizes(regions)
-    return np.where(sizes > 0, np.maximum(sizes, _LEAST) ** -power, 0.0)
+    sizes, within = region_sizes(regions), _within_bounds(regions)
+    if (tiny := np.flatnonzero(within & (sizes < _LEAST))).size:
+        raise ValueError(
+            f"region {regions.names[tiny[0]]} holds {sizes[tiny[0]]:.2g} of the state space, less "
+            f"than the {_LEAST:g} that a prior by size can weigh; make it larger, or take the "
+            "power 0"
+        )
+    weights = np.zeros(len(sizes))
+    weights[within] = sizes[within] ** -power
+    return weights
+
+
+def _within_bounds(regions: Regions) -> Bools:
+    """(C,) whether a region's hull reaches into the bounds, wherever it is if it wraps."""
+    bounds = regions.space.bounds
+    reaches = (regions.lower < bounds.upper) & (regions.upper > bounds.lower)
+    return np.all(regions.space.periodic | reaches, axis=1)

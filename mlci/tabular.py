@@ -63,7 +63,7 @@ class TabularModel:
         explored: the cells whose moves `merged` has; None for all.
 
     Raises:
-        ValueError: moves of another shape or to no cell, or a dt that is not positive.
+        ValueError: moves of another shape or to no cell; a dt or temperature not in (0, inf).
     """
 
     system: System
@@ -80,8 +80,10 @@ class TabularModel:
     def __post_init__(self) -> None:
         if not len(self.truth):
             object.__setattr__(self, "truth", np.zeros(len(self.regions), dtype=bool))
-        if not self.dt > 0:
-            raise ValueError(f"a time step must be positive, not {self.dt} s")
+        if not 0 < self.dt < np.inf:
+            raise ValueError(f"a time step must be positive and finite, not {self.dt} s")
+        if not 0 < self.temperature < np.inf:
+            raise ValueError(f"a temperature must be positive and finite, not {self.temperature}")
         if self.kept is None:
             return
         shape, crosses = self.kept.successor.shape, self.kept.crosses.shape
@@ -196,14 +198,13 @@ class TabularModel:
         """The model at another temperature: moves are the same, rewards scale.
 
         Raises:
-            ValueError: a temperature that is not positive.
+            ValueError: a temperature that is not positive and finite.
         """
-        if not temperature > 0:
-            raise ValueError(f"a temperature must be positive, not {temperature}")
-        kept = self.kept
-        if kept is not None:
-            kept = replace(kept, reward=kept.reward * (self.temperature / temperature))
-        return replace(self, kept=kept, temperature=temperature)
+        model = replace(self, kept=None, temperature=temperature)
+        if self.kept is None:
+            return model
+        reward = self.kept.reward * (self.temperature / temperature)
+        return replace(model, kept=replace(self.kept, reward=reward))
 
     def under(self, truth: ArrayLike) -> TabularModel:
         """The model under constraints, equation (3): moves that cross the truth are not allowed.

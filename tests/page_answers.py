@@ -58,7 +58,7 @@ def answer_of(
         Answer(
             inference=inference,
             support=support(inference),
-            misfit=Misfit(violated.sum(axis=1), violated.sum(axis=1), none, none),
+            misfit=Misfit(violated.sum(axis=1), violated.sum(axis=1), none, none, none, none),
             unseen=unseen(inference),
             cut=np.zeros((shape[1], regions.space.dimension), dtype=bool),
             temperature=1.0,

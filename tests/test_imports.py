@@ -148,7 +148,7 @@ MLCI = {
     "mlci.preparation": "mlci.inference mlci.models",
     "mlci.rank_errors": "mlci.json_numbers mlci.preparation",
     "mlci.similar_tasks": "mlci.demonstrator mlci.models",
-    "mlci.calibration": "mlci.forecast_scores mlci.similar_tasks mlci.preparation",
+    "mlci.calibration": "mlci.forecast_scores mlci.misfit mlci.similar_tasks mlci.preparation",
     "mlci.inverse_dynamics": "mlci.demonstrations mlci.simulate",
     "mlci.actuation.hypotheses": "mlci.inverse_dynamics",
     "mlci.actuation.ranges": "mlci.actuation.hypotheses",

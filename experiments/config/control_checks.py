@@ -78,10 +78,10 @@ def _range_problems(key: str, listed: tuple[ControlRange, ...], system: System) 
         for k, (low, high) in enumerate(zip(each.lower, each.upper, strict=True)):
             first, last = box.lower[k], box.upper[k]
             if low is not None and high is not None and low >= high:
-                yield f"{key}[{i}]: control {k} from {low} to {high}; lower must be below upper"
+                yield f"{key}[{i}]: control {k + 1} from {low} to {high}; lower must be below upper"
             elif (low is not None and low >= last) or (high is not None and high <= first):
                 yield (
-                    f"{key}[{i}]: holds nothing of control {k}, which goes from {first:g} to "
+                    f"{key}[{i}]: holds nothing of control {k + 1}, which goes from {first:g} to "
                     f"{last:g}; move the range inside"
                 )
     if len({(each.lower, each.upper) for each in listed}) < len(listed):

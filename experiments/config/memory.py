@@ -19,6 +19,9 @@ _MERGED_AN_ACTION, _BYTES_A_MERGED_MOVE = 4, 50
 _BYTES_A_STEP = 16  # and cell: log Z, and which cells can be occupied
 _BYTES_A_HYPOTHESIS = 30_000  # while crossings are found
 _COPIES_OF_PATHS, _COPIES_OF_CROSSINGS = 6, 3  # of sampled paths, at most, while they are weighed
+# Of a first guess and step: paths, their derivatives, gains, and candidates of the line search;
+# measured with 2 and 4 states and half as many controls.
+_NUMBERS_A_DIMENSION = 22
 _BYTES_AT_REST = 200_000_000  # the interpreter, its packages, and blocks of work
 
 
@@ -57,6 +60,14 @@ def _of_samples(settings: ModelSettings, samples: int) -> float:
     hypotheses += settings.hypotheses.count
     copies = _COPIES_OF_PATHS * numbers + _COPIES_OF_CROSSINGS * hypotheses
     return samples * copies * 8 + _BYTES_AT_REST
+
+
+def trial_memory(settings: Settings, trials: int) -> float:
+    """Bytes that the demonstrator takes for so many trials, which it solves side by side."""
+    asked, system = settings.demonstrations, settings.model
+    numbers = _NUMBERS_A_DIMENSION * (system.space.dimension + system.control_box.dimension)
+    steps = settings.horizon / asked.dt
+    return float(trials) * asked.restarts * steps * numbers * 8 + _BYTES_AT_REST
 
 
 def machine_memory() -> float:

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from experiments.config.memory import expected_memory, machine_memory
+from experiments.config.memory import expected_memory, machine_memory, trial_memory
 from experiments.config.settings import (
     AdviceSettings,
     ModelSettings,
@@ -91,6 +91,20 @@ def size_problems(settings: ModelSettings) -> Iterator[str]:
             f"{settings.transition.samples} samples and these hypotheses takes about {needed:.3g} "
             f"GB, and this machine has {there:.3g}; use fewer cells, actions, samples or hypotheses"
         )
+
+
+def trial_problems(settings: Settings) -> Iterator[str]:
+    """More trials of the demonstrator than fit into memory."""
+    there, asked = machine_memory(), settings.demonstrations
+    trials = {"demonstrations.pairs": asked.pairs, "dynamics.tasks": settings.dynamics.tasks}
+    for key, count in trials.items():
+        if (needed := trial_memory(settings, count)) > there:
+            yield (
+                f"{key}: {count} trials, of {asked.restarts} first guesses each and in steps of "
+                f"{asked.dt:g} s, take about {needed / 1e9:.3g} GB, and this machine has "
+                f"{there / 1e9:.3g}; lower it or demonstrations.restarts, or raise "
+                "demonstrations.dt"
+            )
 
 
 def soft_problems(settings: RecordedSettings) -> Iterator[str]:

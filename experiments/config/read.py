@@ -30,6 +30,7 @@ from experiments.config.number_checks import (
     size_problems,
     soft_problems,
     study_problems,
+    trial_problems,
 )
 from experiments.config.paths import HasResults, results_folder
 from experiments.config.problems import ConfigError, checked
@@ -86,7 +87,7 @@ def read_config(tree: Mapping[str, Any]) -> tuple[Settings, StudySettings]:
     # Each group of checks relies on the one before.
     _refuse(study_problems(study), count_problems(settings), point_cell_problems(settings))
     _refuse(shape_problems(settings), point_shape_problems(settings), truth_problems(settings))
-    _refuse(size_problems(settings))
+    _refuse(size_problems(settings), trial_problems(settings))
     _refuse(hypothesis_problems(settings), control_truth_problems(settings))
     _refuse(control_hypothesis_problems(settings))
     _refuse(safe_set_problems(settings))

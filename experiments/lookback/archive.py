@@ -221,8 +221,8 @@ class Archive:
         Raises:
             ArchiveError: there is none, or several.
         """
-        if Path(name).absolute().parent == (self.results / "points").absolute():
-            name = Path(name).name  # as `run.py` prints it
+        if (path := Path(name).resolve()).parent == (self.results / "points").resolve():
+            name = path.name  # as `run.py` prints it
         if isinstance(listing := self._listings.get(name), StudyError):
             raise ArchiveError(str(listing))
         if listing is not None:

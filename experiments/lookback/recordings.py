@@ -50,9 +50,10 @@ def write_recordings(facts: Facts, folder: Path) -> list[Path]:
         raise ArchiveError(
             f"{identity}: its demonstrations are not as points write them: {error}"
         ) from None
-    forecasts = stages.get("forecasts")
-    if forecasts and not store.copy("forecasts", forecasts, Store(folder / CALIBRATION)):
-        raise ArchiveError(f"{identity}: its stored calibration is gone; run it again")
+    for stage in ("forecasts", "control_forecasts"):
+        key = stages.get(stage)
+        if key and not store.copy(stage, key, Store(folder / CALIBRATION)):
+            raise ArchiveError(f"{identity}: its stored calibration is gone; run it again")
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / f"trial_{number:03d}.csv" for number in demonstrations]
     for path, demonstration in zip(files, demonstrations.values(), strict=True):

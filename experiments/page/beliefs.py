@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.belief_lines import Beliefs, controls_assumed
+from experiments.belief_lines import Beliefs, all_entered, area_concern, controls_assumed
 from experiments.console import bounds
 from experiments.page.words import of_100
 from mlci.actuation.inference import ControlInference
-from mlci.answers import listed
 from mlci.areas.belief import AreaBelief
+from mlci.misfit import listed
 from mlci.sets.posterior import SetPosterior
 
 _AREAS, _NAMED = 3, 5  # parts of an area; regions, or ranges
@@ -30,6 +30,8 @@ def _area_sentences(belief: AreaBelief | None) -> list[str]:
     """What is believed of an area of one or two shapes; nothing where that is not asked."""
     if belief is None:
         return []
+    if not np.isfinite(belief.overlap):
+        return [f"An area of one or two shapes: {all_entered(belief)}."]
     none = of_100(float(belief.sizes[0]))
     sentences = [
         "If what is avoided has the form of one or two of the shapes that were asked for: that "
@@ -46,6 +48,8 @@ def _area_sentences(belief: AreaBelief | None) -> list[str]:
             "This area and what is avoided are expected to share "
             f"{belief.overlap:.2f} of all that is in either."
         )
+    if concern := area_concern(belief):
+        sentences.append(f"Do not rely on this area: {concern}.")
     return sentences
 
 

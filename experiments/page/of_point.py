@@ -14,8 +14,8 @@ from experiments.page.words import where
 from experiments.point.inference import infer_point, point_answer
 from experiments.tracking.points import State
 from experiments.tracking.store import Store
-from mlci.answers import listed
 from mlci.inference import Inference
+from mlci.misfit import listed
 
 _SHORT = 12  # characters of an identity in the title
 

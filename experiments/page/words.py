@@ -8,7 +8,8 @@ import numpy as np
 
 from experiments.console import NEXT_ASSUMED, bounds, sampled_words, task_words
 from experiments.terminal import words
-from mlci.answers import Answer, listed
+from mlci.answers import Answer
+from mlci.misfit import listed
 from mlci.regions import Regions
 from mlci.spaces import Ints, middle_and_half
 

@@ -14,6 +14,7 @@ from experiments.point.area_shapes import area_belief, area_record, area_table
 from experiments.point.controls import control_record, recorded_controls
 from experiments.point.sets import set_belief, set_record
 from experiments.progress import begin
+from experiments.tracking.store import Store
 from mlci.demonstrations import Demonstration
 from mlci.inference import Inference
 from mlci.models import Model
@@ -45,6 +46,7 @@ def recorded_beliefs(
     model: Model,
     demonstrations: Sequence[Demonstration],
     inference: Inference,
+    exported: Store | None = None,
 ) -> Beliefs:
     """What is asked of recorded demonstrations beside the ranking of regions.
 
@@ -53,12 +55,13 @@ def recorded_beliefs(
         model: the model of the agent.
         demonstrations: the N demonstrations.
         inference: what they say of single regions.
+        exported: as of `recorded_controls`.
     """
     begin("weighing sets of hypotheses")
     sets = set_belief(settings, model, demonstrations, inference, np.random.default_rng(0))
     controls = area = None
     if isinstance(model, TabularModel):
-        controls = recorded_controls(settings, model, demonstrations)
+        controls = recorded_controls(settings, model, demonstrations, exported)
         begin("weighing areas of one or two shapes")
         area = area_belief(settings, model, demonstrations, inference, np.random.default_rng(0))
     return Beliefs(inference.hypotheses.names, sets, controls, area)

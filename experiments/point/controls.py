@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from experiments.config.settings import ModelSettings, RecordedSettings, Setting
 from experiments.config.settings.controls import ranges_of
 from experiments.point.forecasts import (
     TRIALS,
+    exported_stage,
     forecast_inputs,
     free_demonstrations,
     map_arrays,
@@ -35,6 +37,8 @@ from mlci.similar_tasks import similar_demonstrations
 from mlci.spaces import Bools
 from mlci.tabular import TabularModel
 
+_STAGE = "control_forecasts"
+
 
 def point_controls(
     settings: Settings,
@@ -45,25 +49,40 @@ def point_controls(
     """What a point's demonstrations say of controls; None where nothing is asked of these."""
     forecasts = None
     if _is_asked(settings) and settings.inference.calibrate:
-        modules = [mlci.actuation.inference, mlci.demonstrator, system_module(settings.model)]
+        modules = _modules(settings)
         depends = (*forecast_inputs(settings), settings.hypotheses.controls)
 
         def compute() -> dict[str, np.ndarray]:
             return map_arrays(_fitted(settings, model, free_demonstrations(settings)))
 
-        stored = store.get("control_forecasts", depends, [*modules, sys.modules[__name__]], compute)
+        stored = store.get(_STAGE, depends, modules, compute)
         forecasts = stored_map(stored)
     return _inferred(settings, model, demonstrations, forecasts)
 
 
 def recorded_controls(
-    settings: RecordedSettings, model: TabularModel, demonstrations: Sequence[Demonstration]
+    settings: RecordedSettings,
+    model: TabularModel,
+    demonstrations: Sequence[Demonstration],
+    exported: Store | None = None,
 ) -> ControlInference | None:
-    """What recorded demonstrations say of controls; None where nothing is asked of these."""
+    """What recorded demonstrations say of controls; None where nothing is asked of these.
+
+    Args:
+        settings: what is asked.
+        model: the tabular model.
+        demonstrations: the N demonstrations.
+        exported: what a point's calibration was exported to, with its demonstrations. If it fits,
+            it is used; else tasks like the recorded ones are simulated.
+    """
     forecasts = None
     if _is_asked(settings):
         begin("ranking ranges of controls")
-        if settings.inference.calibrate:
+        if settings.inference.calibrate and exported is not None:
+            more = settings.hypotheses.controls
+            modules = _modules(settings)
+            forecasts = exported_stage(settings, exported, _STAGE, modules, stored_map, more)
+        if settings.inference.calibrate and forecasts is None:
             rng = np.random.default_rng(0)
             unlimited = similar_demonstrations(model, demonstrations, TRIALS, rng)
             forecasts = _fitted(settings, model, unlimited)
@@ -145,6 +164,12 @@ def control_record(controls: ControlInference) -> dict[str, Any]:
             for row in controls.to_frame().to_dict("records")
         ],
     }
+
+
+def _modules(settings: ModelSettings) -> list[ModuleType]:
+    """The modules that a map of forecasts of controls depends on."""
+    here = sys.modules[__name__]
+    return [mlci.actuation.inference, mlci.demonstrator, system_module(settings.model), here]
 
 
 def _is_asked(settings: ModelSettings) -> bool:

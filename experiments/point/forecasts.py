@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -35,6 +35,7 @@ from mlci.models import Model
 TRIALS = 200
 SEED = 1 << 32  # one more than a study can have: none of its tasks is among these
 _JUDGED = ("before", "after")
+T = TypeVar("T")
 
 
 def forecast_inputs(settings: Settings) -> tuple[Any, ...]:
@@ -99,15 +100,38 @@ def exported_calibration(settings: RecordedSettings, exported: Store) -> Calibra
     It fits if the tabular model, the hypotheses and the kind of ends are the point's, if every
     touch counts as crossing, as it does in points, and if the source is that of now.
     """
+    if not settings.crossing.crossing().is_any:
+        return None
+    return exported_stage(settings, exported, "forecasts", _modules(settings), _calibration)
+
+
+def exported_stage(
+    settings: RecordedSettings,
+    exported: Store,
+    stage: str,
+    modules: Sequence[ModuleType],
+    read: Callable[[Mapping[str, np.ndarray]], T],
+    *more: Any,
+) -> T | None:
+    """What a point was exported with, if it fits: see `exported_calibration`.
+
+    Args:
+        settings: of the inference from the exported demonstrations.
+        exported: the store that lies beside them.
+        stage: what is asked for.
+        modules: those that the point computed it with.
+        read: makes it of the stored arrays.
+        more: what it depends on beside `forecast_inputs`.
+    """
     model, ends = model_inputs(settings, settings.candidates), settings.inference.exact_ends
-    inputs = canonical_json(plain([model, settings.sampling, ends]))
-    source = source_hash([module.__name__ for module in _modules(settings)])
-    for made_from, arrays in exported.entries("forecasts"):
+    inputs = canonical_json(plain([model, settings.sampling, ends, *more]))
+    source = source_hash([module.__name__ for module in modules])
+    for made_from, arrays in exported.entries(stage):
         try:
             depends = made_from["depends"]
-            same = canonical_json([depends[0], *depends[-2:]]) == inputs
-            if same and made_from["source"] == source and settings.crossing.crossing().is_any:
-                return _calibration(arrays)
+            same = canonical_json([depends[0], *depends[-2 - len(more) :]]) == inputs
+            if same and made_from["source"] == source:
+                return read(arrays)
         except (LookupError, TypeError, ValueError):  # somebody else made it
             continue
     return None
@@ -171,7 +195,10 @@ def _score_row(scores: ForecastScores) -> list[float]:
 
 def _arrays(calibration: Calibration) -> dict[str, np.ndarray]:
     """A calibration as arrays, for the store."""
-    arrays = {"tasks": np.array([calibration.tried, calibration.used])}
+    arrays = {
+        "tasks": np.array([calibration.tried, calibration.used]),
+        "excess": calibration.excess,
+    }
     if calibration.out_of_reach is not None:
         arrays["out_of_reach"] = np.array(calibration.out_of_reach)
     arrays |= map_arrays(calibration.map)
@@ -194,6 +221,7 @@ def _calibration(arrays: Mapping[str, np.ndarray]) -> Calibration:
         before=before,
         after=after,
         out_of_reach=None if out_of_reach is None else float(out_of_reach),
+        excess=arrays["excess"],
     )
 
 

@@ -146,4 +146,5 @@ def point_answer(settings: Settings, point: PointInference) -> Answer:
         hypotheses=point.hypotheses,
         exact_ends=settings.inference.exact_ends,
         samples=settings.misfit,
+        simulated=() if point.calibration is None else point.calibration.excess,
     )

@@ -24,8 +24,8 @@ class ControlRanges(ControlHypotheses):
     Attributes:
         lower: (C, m) lower ends, -inf where there is none.
         upper: (C, m) upper ends, +inf where there is none.
-        names: (C,) name of each, all different; by default its ends in words, such as "control 0
-            above 0.5".
+        names: (C,) name of each, all different; by default its ends in words, such as "control 1
+            above 0.5"; they count from 1, as the columns of recordings do.
 
     Raises:
         ValueError: ends of the wrong shape, an empty range, one that is everything, or names that
@@ -138,7 +138,7 @@ def _described(lower: Floats, upper: Floats) -> str:
     }
     ends = enumerate(zip(lower.tolist(), upper.tolist(), strict=True))
     return ", ".join(
-        f"control {k} " + words[finite].format(low=low, high=high)
+        f"control {k + 1} " + words[finite].format(low=low, high=high)
         for k, (low, high) in ends
         if any(finite := (low > -np.inf, high < np.inf))
     )

@@ -38,6 +38,7 @@ class AreaBelief:
             are, and nan where demonstrations exclude every shape.
         shapes: numbers of the most probable shape or two, nothing left out of account.
         probability: of these.
+        drawn: how many shapes were drawn, of which these are some.
     """
 
     raster: Grid
@@ -47,6 +48,7 @@ class AreaBelief:
     overlap: float
     shapes: tuple[int, ...]
     probability: float
+    drawn: int
 
     @property
     def parts(self) -> tuple[Area, ...]:
@@ -95,7 +97,8 @@ def infer_area(
     raster, inside = evidence.raster, evidence.inside
     if some == -np.inf:  # every shape is excluded
         nowhere = np.zeros(raster.size)
-        return AreaBelief(raster, np.array([1.0, 0, 0]), nowhere, nowhere > 0, np.nan, (), np.nan)
+        none = np.array([1.0, 0, 0]), nowhere, nowhere > 0, np.nan, (), np.nan, count
+        return AreaBelief(raster, *none)
     probability = np.exp(weight - some)  # if anything is forbidden
     of_some, of_one = np.exp(some - total), float(np.sum(probability[one]))
 
@@ -113,4 +116,5 @@ def infer_area(
         overlap=overlap,
         shapes=tuple(sorted({int(feasible[first[best]]), int(feasible[second[best]])})),
         probability=float(of_some * probability[best]),
+        drawn=count,
     )

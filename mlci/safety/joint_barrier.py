@@ -89,7 +89,12 @@ class JointBarrier(ControlFilter):
         return np.asarray(self.value(states) >= margin)
 
     def apply(self, states: Floats, controls: Floats, ahead: Floats | None = None) -> Floats:
-        """See `ControlFilter.apply`: the best joint of each box that a hold would come too near."""
+        """See `ControlFilter.apply`: the best joint of each box that a hold would come too near.
+
+        Raises:
+            ValueError: states that are not (..., 2 L), or controls that are not (..., L).
+        """
+        self._check(states, controls)
         if ahead is None:
             ahead = states + self.dt * self.chain.dynamics(states, controls)
         applied = np.array(controls, dtype=float)
@@ -98,7 +103,8 @@ class JointBarrier(ControlFilter):
         return applied
 
     def linearize(self, states: Floats, controls: Floats) -> tuple[Floats, Floats]:
-        """See `ControlFilter.linearize`: by differences, of the same joints."""
+        """See `ControlFilter.linearize`: by differences, of the same joints; errors as `apply`."""
+        self._check(states, controls)
         n, m = states.shape[-1], controls.shape[-1]
         by_state = np.zeros((*controls.shape, n))
         by_control = np.broadcast_to(np.eye(m), (*controls.shape, m)).copy()
@@ -127,6 +133,16 @@ class JointBarrier(ControlFilter):
             found.append(np.max(np.abs(rest) + np.abs(away), axis=-1))
         return np.stack(found, axis=-1)
 
+    def _check(self, states: Floats, controls: Floats) -> None:
+        """Refuse states and controls that are not of the chain, or do not belong together."""
+        links, shapes = self.chain.links, (np.shape(states), np.shape(controls))
+        batch = shapes[0][:-1]
+        if shapes != ((*batch, 2 * links), (*batch, links)):
+            raise ValueError(
+                f"a barrier of {links} joints takes states (..., {2 * links}) and as many controls "
+                f"(..., {links}), not {shapes[0]} and {shapes[1]}"
+            )
+
     @cached_property
     def _sides(self) -> tuple[Floats, Floats, Floats]:
         """Borders (C, 2 L) and whether they are some, first below K then above, and a (2 L,)."""
@@ -150,12 +166,12 @@ class JointBarrier(ControlFilter):
         with np.errstate(invalid="ignore"):
             return sign * (angles - borders), sign * rates
 
-    def _active(self, states: Floats, ahead: Floats) -> list[tuple[int, tuple[Ints, ...], Ints]]:
+    def _active(self, states: Floats, ahead: Floats) -> list[tuple[int, Bools, Ints]]:
         """Boxes that states ahead are too near to, at which states, and the best joint's side."""
         rooms, found = self._rooms(ahead), []
         near = ~(np.max(rooms, axis=-1) >= self.margin)
         for box in np.flatnonzero(np.any(near, axis=tuple(range(near.ndim - 1)))).tolist():
-            where = np.nonzero(near[..., box])
+            where = near[..., box]
             found.append((box, where, np.argmax(self._rooms(states[where])[:, box], axis=-1)))
         return found
 

@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 from mlci.spaces import Floats
 
+_DIVERGED = (
+    "the search for ways to the goal diverged: from every first guess the state overflows. Check "
+    "the dynamics, start nearer to the goal, or take a shorter task or step"
+)
 _EFFECTIVE, _PARETO, _LATE = 100.0, 0.7, 0.02  # what a result needs to be believed
 
 
@@ -14,7 +18,7 @@ class SamplingDiagnosis:
     """Whether samples can be believed.
 
     Attributes:
-        samples: paths that were drawn.
+        samples: paths that were drawn; none where the search for ways to the goal diverged.
         reached: share of them that end in the goal and stay in the state space.
         effective: paths of equal weight that would tell as much.
         pareto_k: shape of the weights' tail, see `mlci.sampled.weights.pareto_shape`.
@@ -35,6 +39,8 @@ class SamplingDiagnosis:
     @property
     def complaints(self) -> list[str]:
         """Why the samples are not to be believed, a phrase each; empty if they are."""
+        if not self.samples:
+            return [_DIVERGED]
         found = []
         if not self.effective >= _EFFECTIVE:
             found.append(

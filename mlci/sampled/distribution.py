@@ -258,7 +258,7 @@ class SampledDistribution:
     def _require_possible(self) -> None:
         """Raise where there is no distribution."""
         if not self.is_possible:
-            raise ValueError("no sampled path reaches the goal: probabilities are not defined")
+            raise ValueError(f"no sampled path reaches the goal: {self.diagnosis.complaints[0]}")
 
 
 def sample_passage(

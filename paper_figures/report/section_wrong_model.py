@@ -65,10 +65,9 @@ def _limits(rows: pd.DataFrame) -> str:
         f"interval) where: {lost}.\n"
         f"- The best hypothesis claims at least {percent(_SURE)} more than it is right, intervals "
         f"apart, where: {sure}.\n"
-        f"- The warning of nearly impossible demonstrations fires (more than {_FIRING} times as "
-        f"many as of the model's own; nominal demonstrators: {percent(of_default)}) where: "
-        f"{fires}.\n"
-        f"- The answer is lost or too sure and no warning tells, where: {silent}.\n"
+        f"- Nearly impossible demonstrations are more than {_FIRING} times as many as of the "
+        f"model's own (nominal demonstrators: {percent(of_default)}) where: {fires}.\n"
+        f"- The answer is lost or too sure and they are no more, where: {silent}.\n"
     )
 
 

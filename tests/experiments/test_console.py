@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from experiments.console import answer_lines, bounds, probability
+from experiments.console import answer_lines, bounds, measure_lines, probability
 from experiments.page.words import where
 from experiments.terminal import entry
 from mlci.answers import Answer
@@ -54,7 +55,7 @@ def answer(
     return Answer(
         inference,
         support(inference),
-        Misfit(np.zeros(count, int), np.zeros(count), np.ones(count), np.ones(count)),
+        Misfit(np.zeros(count, int), np.zeros(count), *[np.ones(count)] * 4),
         np.arange(0),
         np.zeros((len(hypotheses), space.dimension), bool),
         1.0,
@@ -163,3 +164,15 @@ def test_nothing_is_wider_than_the_terminal_or_broken_inside_a_word() -> None:
         for word in (*each.inference.names[:1], "unavoidable", "(truth)", "angular velocity"):
             assert word in text
         assert not [line for line in lines if line != line.rstrip()]
+
+
+def test_what_is_not_measured_is_said_in_words() -> None:
+    names = ("final_state_error", "violation_distance", "violation_floor")
+    summary = pd.Series({**dict.fromkeys(names, np.nan), "feasible": 0})
+    summary["violation_distance_pooled"] = np.nan
+    ranks = pd.DataFrame({"rank": [np.nan], "demonstrations": [1]})
+    text = " ".join(" ".join(measure_lines(summary, ranks, 5)).split())
+    assert "since rollouts=0 or the tabular agent can reach no goal" in text
+    assert "nan" not in text
+    summary[:] = 1.5
+    assert "error 1.500; violation" in " ".join(measure_lines(summary, ranks, 5))

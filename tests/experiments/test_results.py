@@ -421,8 +421,10 @@ def test_status_tells_why_not(
 def test_infer_on_a_points_recorded_files_gives_its_ranking_back(
     tmp_path: Path, look, monkeypatch: pytest.MonkeyPatch, words: list[str]
 ) -> None:
-    """With goals that are ranges, which the ends of the paths do not tell."""
+    """With goals that are ranges, which the ends of the paths do not tell; and of controls."""
     monkeypatch.setenv("HOME", str(tmp_path))
+    words = [*words, "hypotheses.controls.shares=[0.5]"]
+    calibrated = len(words) == 1
     of_point = [word for word in TINY if not word.startswith("inference")]
     goal = "tasks.goal=[0.6,null]"
     point = computed(read_config(composed(*of_point, goal, *words))[0], tmp_path)
@@ -433,19 +435,44 @@ def test_infer_on_a_points_recorded_files_gives_its_ranking_back(
     assert f"{len(trials)} demonstrations into {folder}" in out
     expected = [f"trial_{i:03d}" for i in trials]
     assert sorted(path.stem for path in folder.iterdir() if path.is_file()) == expected
-    assert (folder / "calibration").exists() == (not words)
+    assert (folder / "calibration").exists() == calibrated
     model = ["system=double_integrator", "dt=0.5", "actions=3", "grid.shape=[12,8]"]
     done = run_here(
         infer.main, "demonstrations=~/recorded", f"results={tmp_path / 'else'}", *model, *words,
         folder=tmp_path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert ("calibrated by the tasks of the point" in done.stderr) == (not words)
+    assert ("calibrated by the tasks of the point" in done.stderr) == calibrated
     (written,) = (tmp_path / "else" / "inference").iterdir()
     ranking, expected = (pd.read_csv(each / "hypotheses.csv") for each in (written, point.folder))
     # To the last digit that a point writes.
     pd.testing.assert_frame_equal(rounded(ranking), expected[ranking.columns], check_exact=True)
     assert ranking["gain"].max() > 0.1
+    ranges, expected = (pd.read_csv(each / "controls.csv") for each in (written, point.folder))
+    pd.testing.assert_frame_equal(rounded(ranges), expected[ranges.columns], check_exact=True)
+
+
+def test_a_point_that_is_named_by_its_folder_is_found_wherever_it_is(
+    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    point = finished(settings, tmp_path / "else")
+    (tmp_path / "link").symlink_to(point.folder)
+    monkeypatch.chdir(tmp_path)
+    out = str(tmp_path / "recorded")
+    for words in (
+        ("show", str(point.folder)),
+        ("show", f"else/points/{point.identity}/"),
+        ("show", "link"),
+        ("demonstrations", str(point.folder), "--out", out),
+        ("diff", str(point.folder), point.identity[:8]),
+    ):
+        monkeypatch.setattr(sys, "argv", ["results", *words])
+        assert results.main() == 0, capsys.readouterr()
+    assert "demonstrations into" in capsys.readouterr().out
+    elsewhere = tmp_path / "points"
+    elsewhere.mkdir()
+    monkeypatch.setattr(sys, "argv", ["results", "show", str(elsewhere / "abc")])
+    assert results.main() == 2
 
 
 def test_a_point_s_page_has_its_ranking_and_its_truth(

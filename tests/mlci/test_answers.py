@@ -72,7 +72,7 @@ def test_the_parts_are_of_the_inference(result: Answer) -> None:
     assert result.inference.credible.share == 0.95
     assert result.misfit.count.tolist() == inference.violated.sum(axis=1).tolist()
     assert result.misfit.is_rare.tolist() == [False, False, False, True]
-    (rare,) = [text for text in result.warnings if "nearly impossible" in text]
+    (rare,) = [text for text in result.warnings if "the model's own" in text]
     assert "1 of 4 demonstrations" in rare
     assert rare.endswith(": astray")
     assert result.warnings[: len(inference.warnings)] == inference.warnings
@@ -158,7 +158,7 @@ def test_a_grid_that_cuts_regions_is_a_warning(result: Answer) -> None:
     assert f"{len(result.unseen)} of 36 regions" in hidden
     neither = replace(result, unseen=result.unseen[:0], cut=np.zeros((36, 2), bool))
     others = neither.warnings[len(result.inference.warnings) :]
-    assert [text for text in others if "nearly impossible" not in text] == []
+    assert [text for text in others if "the model's own" not in text] == []
 
 
 def test_doubts_about_the_recordings_come_first(result: Answer) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from toy_models import every_trajectory, toy_world
@@ -9,7 +11,7 @@ from toy_models import every_trajectory, toy_world
 from mlci.demonstrations import Task
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
-from mlci.misfit import misfit, sample_crossings
+from mlci.misfit import Misfit, excess_of, misfit, sample_crossings
 from mlci.regions import Regions
 from mlci.spaces import Box
 from mlci.systems import DoubleIntegrator
@@ -99,3 +101,54 @@ def test_a_task_that_cannot_be_done_has_no_p(exact_ends: bool) -> None:
     assert not result.is_rare.any()
     with pytest.raises(ValueError, match="reaches a goal"):
         sample_crossings(distribution, 1, np.random.default_rng(0))
+
+
+def test_a_demonstration_is_unlike_simulated_ones_by_the_rank_of_its_excess() -> None:
+    task = Task(np.array([-1.0, 0.0]), Box.point([1.0, 0.0]), 5.0)
+    distribution = TrajectoryDistribution.of_task(MODEL, task, exact_ends=True)
+    drawn = sample_crossings(distribution, 301, np.random.default_rng(4))
+    phi = np.tile(distribution.violation_probabilities(), (301, 1))
+    excess = excess_of(phi, drawn)
+    assert np.mean(excess) == pytest.approx(0, abs=5 * np.std(excess) / np.sqrt(301))
+    one, others = slice(0, 1), excess[1:]
+    result = misfit([distribution], phi[one], drawn[one], samples=0, simulated=others)
+    larger = sum(other >= excess[0] - 1e-9 for other in others)
+    assert result.unlike_p == pytest.approx((1 + larger) / 301)
+    assert np.isnan([result.count_p, result.distance_p]).all()
+    too_few = misfit([distribution], phi[one], drawn[one], samples=0, simulated=others[:99])
+    assert np.isnan(too_few.unlike_p).all()
+    far = misfit([distribution], phi[one], np.ones((1, 36), dtype=bool), simulated=others)
+    assert far.unlike_p == pytest.approx(1 / 301)
+    impossible = TrajectoryDistribution.of_task(MODEL, replace(task, horizon=0.5), exact_ends=True)
+    assert np.isnan(misfit([impossible], phi[one], drawn[one], simulated=others).unlike_p).all()
+
+
+def unlike(p: list[float]) -> Misfit:
+    """Demonstrations of which only their p among simulated ones is known."""
+    none = np.full(len(p), np.nan)
+    return Misfit(none, none, none, none, none, np.array(p))
+
+
+def test_right_sets_are_warned_of_in_one_of_twenty_at_most() -> None:
+    """p of demonstrations that are like the simulated ones: uniform ranks among 200."""
+    rng = np.random.default_rng(5)
+    for count in (1, 3, 10, 65):
+        names = [str(j) for j in range(count)]
+        ranks = rng.integers(1, 202, (4000, count)) / 201
+        share = np.mean([bool(unlike(row.tolist()).warnings(names)) for row in ranks])
+        assert share < 0.05 + 5 * np.sqrt(0.05 * 0.95 / 4000)
+    (few,) = unlike([0.005, 0.5, 0.3]).warnings(["a", "b", "c"])
+    assert few.startswith("1 of 3 demonstrations cross other regions than simulated")
+    assert "by chance in 3.0% of such sets" in few
+    assert few.endswith(": a")
+    assert unlike([0.005, *[0.5] * 64]).warnings([str(j) for j in range(65)]) == []
+    assert unlike([0.005, np.nan]).warnings(["a", "b"])  # the other task cannot be done
+
+
+def test_without_a_calibration_what_is_rare_is_said_to_tell_little() -> None:
+    none = np.full(2, np.nan)
+    (text,) = Misfit(none, none, np.array([0.004, 0.5]), none, none, none).warnings(["a", "b"])
+    assert text.startswith("1 of 2 demonstrations cross other regions than the model's own")
+    assert "Optimal paths often do so too" in text
+    assert text.endswith(": a")
+    assert Misfit(none, none, np.array([0.5, 0.5]), none, none, none).warnings(["a", "b"]) == []

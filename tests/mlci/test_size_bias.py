@@ -46,6 +46,19 @@ def test_sizes_and_weights() -> None:
         weights_by_size(REGIONS, 1e9)
 
 
+@pytest.mark.parametrize(
+    "tiny", [Box([0, 0], [1e-300, 1e-300]), Box([0, 0], [1e-9, 1e-9]), Ball([0, 0], 1e-10)]
+)
+def test_a_region_too_small_to_have_a_size_is_named(tiny: Box | Ball) -> None:
+    """It is in the way of paths as others are; only a region outside the bounds has no weight."""
+    regions = Regions.from_shapes(PLANE, [NESTED[0], tiny], ("large", "tiny"))
+    with pytest.raises(ValueError, match=r"region tiny holds .* less than the 1e-15"):
+        weights_by_size(regions, 0.5)
+    outside = Regions.from_boxes(PLANE, [NESTED[0], Box([5, 5], [6, 6])])
+    weights = weights_by_size(outside, 0.5)
+    np.testing.assert_allclose(weights, [8.0, 0.0])
+
+
 def test_posterior_has_the_prior_by_size() -> None:
     alpha = [0.5, 0.45, 0.4, 0.9]
     equal, weighed = inferred(alpha), inferred(alpha, 1.0)

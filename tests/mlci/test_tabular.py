@@ -204,8 +204,11 @@ def test_another_temperature_is_as_good_as_a_fresh_model(samples: int) -> None:
     assert both[0].is_possible
     np.testing.assert_allclose(both[0].log_z, both[1].log_z, rtol=1e-13)
     np.testing.assert_allclose(*(each.avoidance_probabilities() for each in both), rtol=1e-13)
-    with pytest.raises(ValueError, match="a temperature must be positive, not 0"):
-        model.with_temperature(0)
+    for temperature in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match=f"positive and finite, not {temperature}"):
+            model.with_temperature(temperature)
+        with pytest.raises(ValueError, match=f"positive and finite, not {temperature}"):
+            discretize(*arguments, temperature=temperature)
 
 
 def test_action_grid_spans_the_control_box() -> None:
@@ -268,7 +271,7 @@ def test_errors_print_the_shapes() -> None:
     beyond = replace(good.kept, successor=np.full((3, 2), 3))
     with pytest.raises(ValueError, match="a move leads to no cell"):
         replace(good, kept=beyond)
-    with pytest.raises(ValueError, match="time step must be positive, not 0"):
+    with pytest.raises(ValueError, match="time step must be positive and finite, not 0"):
         replace(good, dt=0.0)
 
 

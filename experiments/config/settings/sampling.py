@@ -6,7 +6,15 @@ from typing import Annotated
 
 from pydantic.dataclasses import dataclass
 
-from experiments.config.settings.kinds import STRICT, Count, CountOrNone, Flag, Positive, about
+from experiments.config.settings.kinds import (
+    STRICT,
+    Count,
+    CountOrNone,
+    Flag,
+    Positive,
+    Restarts,
+    about,
+)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -30,7 +38,7 @@ class SampledSettings:
     ]
     most: Annotated[Count, about("samples of a task that are not exceeded for that")]
     restarts: Annotated[
-        Count, about("first guesses of the search for locally optimal ways, for each winding")
+        Restarts, about("first guesses of the search for locally optimal ways, for each winding")
     ]
     substeps: Annotated[
         Count, about("integrator steps of a time step, between which paths are straight")

@@ -68,13 +68,13 @@ def test_regions_limit_no_control() -> None:
     [
         (
             ranges("truth.controls", "0.5 1"),
-            "truth.controls: control 0 from 0.5 to 1 leaves no interval of each control, from "
+            "truth.controls: control 1 from 0.5 to 1 leaves no interval of each control, from "
             "[-inf] to [inf]: it must cut off one end of one control; with "
             "demonstrations.clip=true the control range has ends",
         ),
-        (ranges("truth.controls", "0.5 null", "null 0.7"), "control 0 below 0.7 leaves no"),
-        (ranges("truth.controls", "1 0.5"), "truth.controls[0]: control 0 from 1.0 to 0.5; lower"),
-        (ranges("truth.controls", "2 null"), "holds nothing of control 0, which goes from -2 to 2"),
+        (ranges("truth.controls", "0.5 null", "null 0.7"), "control 1 below 0.7 leaves no"),
+        (ranges("truth.controls", "1 0.5"), "truth.controls[0]: control 1 from 1.0 to 0.5; lower"),
+        (ranges("truth.controls", "2 null"), "holds nothing of control 1, which goes from -2 to 2"),
         (ranges("truth.controls", "null null"), "truth.controls[0]: holds every control"),
         (
             ranges("hypotheses.controls.ranges", "-9 9"),
@@ -94,9 +94,9 @@ def test_regions_limit_no_control() -> None:
         ("soft.weights=[1.0]", "soft.weights: [1.0], but no truth is there to ask about"),
         ("calibration.sets=3", "the prior knows no such truth"),
         ("truth.name=none", "truth.name: none means that nothing is forbidden"),
-        (ranges(RANGES, "0.1 0.2"), "control 0 from 0.1 to 0.2 holds none of the 9 actions"),
+        (ranges(RANGES, "0.1 0.2"), "control 1 from 0.1 to 0.2 holds none of the 9 actions"),
         (ranges(RANGES, "1,2 null,null"), f"{RANGES}[0].lower: [1.0, 2.0] must have 1 entries"),
-        (ranges(RANGES, "null -2"), f"{RANGES}[0]: holds nothing of control 0"),
+        (ranges(RANGES, "null -2"), f"{RANGES}[0]: holds nothing of control 1"),
         ("hypotheses.controls.shares=[0.5,0.5]", "need as many different names"),
         ("hypotheses.controls.shares=[1.0]", "hypotheses.controls.shares[0]: 1.0 must be below 1"),
         ("hypotheses.controls.tolerance=1", "hypotheses.controls.tolerance: 1.0 must be below 1"),

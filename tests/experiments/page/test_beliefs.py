@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from page_answers import CIRCLE, answer_of
 
-from experiments.belief_lines import Beliefs
+from experiments.belief_lines import Beliefs, belief_lines
 from experiments.page.beliefs import belief_sentences
 from experiments.page.document import page
 from mlci.actuation.inference import ControlInference
@@ -61,8 +61,8 @@ def test_controls_are_told_with_what_is_assumed() -> None:
     # Likelihoods 5 and 1.25 at a prior of 0.25 each, against 1 at 0.5.
     likely = belief_sentences(Beliefs(NAMES, None, controls([0.2, 0.8], [False, False]), None))
     assert likely[0] == (
-        "Controls that are not applied, the likeliest first: control 0 above 1: 60.6 of 100; "
-        "control 0 above 2: 15.2 of 100. That all are in use: 24.2 of 100."
+        "Controls that are not applied, the likeliest first: control 1 above 1: 60.6 of 100; "
+        "control 1 above 2: 15.2 of 100. That all are in use: 24.2 of 100."
     )
     assert "at most one range is forbidden, and no region" in likely[1]
     applied = belief_sentences(Beliefs(NAMES, None, controls([0.2, 0.8], [True, True]), None))
@@ -74,13 +74,21 @@ def test_an_area_is_told_by_its_parts_and_by_how_far_it_can_be_trusted() -> None
     raster = Grid(CIRCLE, (4, 4))
     area = np.arange(16) == 5
     sizes, chance = np.array([0.25, 0.25, 0.5]), np.where(area, 0.6, 0.1)
-    belief = AreaBelief(raster, sizes, chance, area, 0.4, (0,), 0.3)
+    belief = AreaBelief(raster, sizes, chance, area, 0.4, (0,), 0.3, 900)
     none, part, overlap = belief_sentences(Beliefs(NAMES, area=belief))
     assert none.endswith("nothing is avoided, 25.0 of 100.")
     assert part.endswith("avoided somewhere there: at least 60.0 of 100.")
     assert overlap.endswith("are expected to share 0.40 of all that is in either.")
     nowhere = replace(belief, area=np.zeros(16, bool), overlap=np.nan)
-    assert len(belief_sentences(Beliefs(NAMES, area=nowhere))) == 1
+    (entered,) = belief_sentences(Beliefs(NAMES, area=nowhere))
+    assert "demonstrations enter each of the 900 shapes" in entered
+    assert "warning" not in " ".join(belief_lines(Beliefs(NAMES, area=belief), 5))
+    text = " ".join(" ".join(belief_lines(Beliefs(NAMES, area=nowhere), 5)).split())
+    assert "each of the 900 shapes that were drawn" in text
+    assert "nan" not in text
+    few = Beliefs(NAMES, area=replace(belief, drawn=10))
+    assert "10 shapes were drawn, too few to tell an area" in belief_sentences(few)[-1]
+    assert "10 shapes were drawn, too few" in " ".join(" ".join(belief_lines(few, 5)).split())
 
 
 def test_beliefs_stand_below_the_answer_and_are_text() -> None:

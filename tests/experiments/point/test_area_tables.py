@@ -70,6 +70,22 @@ def test_each_subset_has_the_answer_of_its_own_demonstrations(tmp_path: Path) ->
     assert tables["area_map"]["climb_1"].sum() == pytest.approx(climb.mean())
 
 
+def test_a_point_of_the_raster_belongs_to_the_first_hypothesis_that_holds_it(
+    tmp_path: Path,
+) -> None:
+    """0.3 to 0.9 m and 0.6 to 1.2 m overlap; what is elsewhere belongs to none."""
+    slices = "[{lower: [0.3, null], upper: [0.9, null]}, {lower: [0.6, null], upper: [1.2, null]}]"
+    words = ["hypotheses.shape=null", f"hypotheses.boxes={slices}", "inference.shapes.count=4"]
+    settings = read_config(composed(*TINY, *words, "inference.shapes.samples=10"))[0]
+    ways = ShapeWays.of(settings, infer_point(settings, Store(tmp_path)))
+    assert ways is not None
+    place = ways.evidence.raster.centers[:, 0]
+    expected = np.select([(place > 0.3) & (place < 0.9), (place > 0.6) & (place < 1.2)], [0, 1], 2)
+    np.testing.assert_array_equal(ways.cell, expected)
+    assert set(expected.tolist()) == {0, 1, 2}
+    np.testing.assert_array_equal(ways.truth, (place > 0.6) & (place < 1.2))
+
+
 def test_a_truth_that_hypotheses_cover_in_part(tmp_path: Path) -> None:
     """Slices 0.3 to 0.8 m and on to 1 m; of the wall, 0.6 to 1.2 m, neither has a third."""
     slices = "[{lower: [0.3, null], upper: [0.8, null]}, {lower: [0.8, null], upper: [1.0, null]}]"

@@ -56,8 +56,8 @@ def test_tables_of_a_point(tmp_path: Path) -> None:
     ranked = pd.read_csv(point.folder / "controls.csv")
     assert ranked["is_truth"].sum() == 1
     assert ranked.loc[ranked["in_truth"], "name"].tolist() == [
-        "control 0 above 0.4",
-        "control 0 above 0.8",
+        "control 1 above 0.4",
+        "control 1 above 0.8",
     ]
     assert ranked["applied_by"].iloc[0] == 0
     assert ranked.loc[ranked["gain"] == -np.inf, "posterior"].eq(0).all()
@@ -100,7 +100,7 @@ def test_ranks_of_controls_by_hand(tmp_path: Path) -> None:
     inferred = infer_point(settings, Store(tmp_path)).beliefs.controls
     assert inferred is not None
     names = inferred.hypotheses.names
-    alpha = {"control 0 above 0.4": 0.02, "control 0 below -0.4": 0.0}
+    alpha = {"control 1 above 0.4": 0.02, "control 1 below -0.4": 0.0}
     same = np.tile([alpha.get(name, 1.0) for name in names], (len(inferred.names), 1))
     known = dataclasses.replace(inferred, avoidance=same, applied=np.zeros_like(inferred.applied))
     ranks = controls.control_tables(settings, known, np.random.default_rng(0))["control_ranks"]
@@ -108,7 +108,7 @@ def test_ranks_of_controls_by_hand(tmp_path: Path) -> None:
     error = settings.inference.model_error
     of_truth, of_first = ((1 / ((1 - error) * a + error)) / 4 for a in (0.02, 0.0))
     total = 1 + of_truth + of_first + 2 / 4  # as probable as nothing, all ranges together
-    assert one["first"].eq("control 0 below -0.4").all()
+    assert one["first"].eq("control 1 below -0.4").all()
     assert one["rank"].eq(2).all()
     np.testing.assert_allclose(one["posterior"], of_truth / total)
     np.testing.assert_allclose(one["none"], 1 / total)

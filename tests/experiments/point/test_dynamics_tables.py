@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from experiments.config.paths import CONF
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
 from experiments.point import dynamics_tables
-from experiments.point.dynamics_tables import unconstrained_paths
+from experiments.point.dynamics_tables import dynamics_table, unconstrained_paths
+from experiments.point.inference import infer_point
+from experiments.point.ranking_tables import rank_table
 from experiments.point.run import run_point
 from experiments.point.truth_draw import drawn_truths
 from experiments.tracking.store import Store
@@ -55,6 +58,33 @@ def test_the_row_is_the_outlook_of_the_truth_and_its_ranks(store: Store) -> None
     assert row["out_of_reach"] == pytest.approx(1 - tables["trials"]["reachable"].mean())
     distance = tables["trials"]["violation_distance"]
     assert row["violation_distance"] == pytest.approx(distance.mean(), nan_ok=True)
+
+
+def test_only_tasks_that_the_demonstrator_can_do_count(store: Store) -> None:
+    settings = read_config(composed(*POINT))[0]
+    paths = unconstrained_paths(settings, store)
+    assert 0 < len(paths) < settings.dynamics.tasks
+    for path in paths:
+        miss = path.task.goal.lower - path.states[-1]  # a point
+        assert np.linalg.norm(miss) <= settings.demonstrations.goal_tolerance
+
+
+def test_a_truth_of_several_hypotheses_is_known_by_the_one_that_is_crossed_most(
+    store: Store,
+) -> None:
+    wide = "truth.boxes=[{lower: [0.4, -0.8], upper: [0.8, 0.4]}]"
+    settings = read_config(composed(*POINT, "truth.cell=null", wide))[0]
+    covered = np.flatnonzero(settings.candidates.inside(settings.constraint))
+    assert covered.tolist() == [63, 64, 65]
+    point = infer_point(settings, store)
+    ranks = rank_table(settings, point.inference, np.random.default_rng(0))
+    measures = SimpleNamespace(violation_distance=np.ones(3))
+    (row,) = dynamics_table(settings, point, measures, ranks, store).to_dict("records")
+    known = outlook(point.tabular, unconstrained_paths(settings, store), point.hypotheses)
+    assert np.argmax(known.crossed[covered]) == 1  # neither the first nor the last
+    features = known.features(settings.ranks.demonstrations)
+    np.testing.assert_allclose([row[name] for name in FEATURES], features[64])
+    assert not np.allclose(features[64], features[63])
 
 
 def test_no_demonstration_has_a_part_in_what_is_known_before() -> None:

@@ -169,3 +169,20 @@ def test_advice_on_models_follows_what_both_say() -> None:
     assert replace(alike, samples=None).lines() == [
         "model=tabular: no sampled path does the task (0.3 s)"
     ]
+
+
+@pytest.mark.parametrize("first", [6, 7])
+def test_the_truth_has_the_rank_of_the_best_hypothesis_inside(first: int, tmp_path: Path) -> None:
+    """Of slices of 0.6 m, 1.2 m of truth hold two; one of them is in the way of every task."""
+    wide = "truth.boxes=[{lower: [0.6, null], upper: [1.8, null]}]"
+    settings = read_config(composed(*TINY, wide, "models.trials=2", "misfit=0"))[0]
+    point = infer_point(settings, Store(tmp_path))
+    covered = np.flatnonzero(point.inference.hypotheses.inside(settings.constraint))
+    assert covered.tolist() == [6, 7]
+    alpha = np.full(point.inference.avoidance.shape, 0.9)
+    alpha[:, first] = 0.1
+    nothing = np.zeros(alpha.shape, dtype=bool)
+    inference = replace(point.inference, avoidance=alpha, violated=nothing)
+    tables = model_tables.model_tables(settings, replace(point, inference=inference))
+    (row,) = tables["models"].to_dict("records")
+    assert (row["rank"], row["rank_lowest"], row["rank_highest"]) == (1, 1, 1)

@@ -284,7 +284,7 @@ def test_ranges_that_a_model_cannot_tell_are_refused() -> None:
     narrow = ControlRanges([[0.2 * LIMIT]], [[0.4 * LIMIT]])
     with pytest.raises(
         ValueError,
-        match=r"control 0 from 0\.2 to 0\.4 forbids none of the model's moves, of 3 actions",
+        match=r"control 1 from 0\.2 to 0\.4 forbids none of the model's moves, of 3 actions",
     ):
         infer_controls(model, [], narrow)
     with pytest.raises(ValueError, match="ranges of 2 controls do not fit actions of 1"):

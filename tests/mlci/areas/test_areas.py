@@ -200,7 +200,7 @@ def test_parts_of_an_area_hang_together() -> None:
 def test_a_part_is_as_probable_as_its_most_probable_point() -> None:
     raster = Grid(StateSpace(Box([0.0], [6.0]), [False], ("place",)), (6,))
     chance = np.array([0.4, 0.8, 0.6, 0.1, 0.5, 0.3])
-    belief = AreaBelief(raster, np.array([0, 1.0, 0]), chance, chance > 0.3, 0.5, (0,), 0.4)
+    belief = AreaBelief(raster, np.array([0, 1.0, 0]), chance, chance > 0.3, 0.5, (0,), 0.4, 900)
     assert [part.probability for part in belief.parts] == [0.8, 0.5]
 
 

@@ -141,3 +141,36 @@ def test_a_joint_that_wraps_has_no_sides():
     truth = Regions.from_boxes(wheel.space, [Box([1.0, -np.inf], [2.0, np.inf])])
     with pytest.raises(ValueError, match="joints that wrap: joint_1"):
         JointBarrier(wheel, truth, HELD, (1.0,))
+
+
+def test_a_single_state_is_filtered_as_one_of_many():
+    states = np.zeros((2, 6))
+    states[:, 0], states[1, 3] = 0.1, 1.0
+    controls = np.ones((2, 3))
+    passed, (by_state, by_control) = (
+        BARRIER.apply(states, controls),
+        BARRIER.linearize(states, controls),
+    )
+    for i in range(2):
+        np.testing.assert_allclose(BARRIER.apply(states[i], controls[i]), passed[i])
+        one_state, one_control = BARRIER.linearize(states[i], controls[i])
+        np.testing.assert_allclose(one_state, by_state[i])
+        np.testing.assert_allclose(one_control, by_control[i])
+    assert np.any(passed[1] != controls[1])
+
+
+def test_without_regions_everything_passes():
+    free = JointBarrier(ARM, boxes(), HELD, BARRIER.braking)
+    state, control = np.zeros(6), np.ones(3)
+    np.testing.assert_array_equal(free.apply(state, control), control)
+    by_state, by_control = free.linearize(state, control)
+    np.testing.assert_array_equal(by_state, np.zeros((3, 6)))
+    np.testing.assert_array_equal(by_control, np.eye(3))
+    assert free.value(state) == np.inf
+
+
+@pytest.mark.parametrize("shapes", [((1, 5), (1, 3)), ((1, 6), (1, 4)), ((3, 6), (2, 3)), ((), ())])
+@pytest.mark.parametrize("call", [BARRIER.apply, BARRIER.linearize])
+def test_shapes_that_do_not_fit_are_refused(call, shapes):
+    with pytest.raises(ValueError, match=r"takes states \(\.\.\., 6\) and as many controls"):
+        call(*map(np.zeros, shapes))

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from linear_bridge import WIDE, random_bridge
 
-from mlci.demonstrations import Task
+from mlci.demonstrations import Demonstration, Task
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.models import forecast_of
+from mlci.preparation import infer
 from mlci.regions import Regions
 from mlci.sampled.distribution import SampledModel, SamplingDiagnosis
 from mlci.spaces import Box, Floats, StateSpace
@@ -256,3 +257,18 @@ def test_paths_that_diverge_have_no_weight(linear, cubic):
     assert np.isfinite(distribution.paths).all()
     if distribution.is_possible:
         assert np.isfinite(distribution.violation_probabilities()).all()
+
+
+def test_a_search_that_diverges_is_said_to():
+    """x' = 5 x + 50 x^3 is infinite within 0.02 s from 1, whatever the control."""
+    line = StateSpace(Box([-2.0], [2.0]), [False], ("x",))
+    system = FunctionSystem(
+        lambda x, u: (5 * x[..., 0] + 50 * x[..., 0] ** 3 + u[..., 0],), line, Box([-1.0], [1.0])
+    )
+    model = SampledModel(system, Regions.from_grid(line, (4,)), 0.1, samples=100)
+    task = Task(np.array([1.0]), Box.point([1.5]), 2.0)
+    with pytest.raises(ValueError, match=r"reaches the goal: the search .* diverged"):
+        model.distribution(task).violation_probabilities()
+    path = Demonstration.from_path(np.linspace(1, 1.5, 21)[:, None], 0.1, name="up")
+    (told, _) = infer(model, [path]).warnings
+    assert told.startswith("the samples of up are not to be believed: the search")
