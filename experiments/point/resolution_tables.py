@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from experiments.config.memory import RESOLUTION_SAMPLES
 from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
 from mlci.cells.goal_cells import goal_tree
@@ -26,7 +27,6 @@ CENTRE, AVERAGED, MULTILINEAR = "centre", "averaged", "multilinear"
 ROUND_GOALS, VARYING, OF_TASK = "round goals", "varying", "of each task"
 Cells = TabularModel | RefinedModel
 
-_POINTS = 2  # start points along each dimension of a cell, where there are several
 _TOLERANCE = 0.02  # of the goal, where paths are sampled: a fifth of a cell, to be near a point
 
 
@@ -131,7 +131,7 @@ def _centre(base: TabularModel, _tasks: Sequence[Task], count: int) -> TabularMo
 
 
 def _averaged(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularModel:
-    return replace(_centre(base, tasks, count), samples=_POINTS)
+    return replace(_centre(base, tasks, count), samples=RESOLUTION_SAMPLES)
 
 
 def _multilinear(base: TabularModel, _tasks: Sequence[Task], count: int) -> TabularModel:
@@ -148,17 +148,21 @@ def _multilinear(base: TabularModel, _tasks: Sequence[Task], count: int) -> Tabu
 def _round_goals(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularModel:
     grid = _scaled(base.equal_cells, count)
     tree = goal_tree(grid, [task.goal for task in tasks], grid.widths)
-    return replace(base, grid=tree, samples=_POINTS)
+    return replace(base, grid=tree, samples=RESOLUTION_SAMPLES)
 
 
 def _varying(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularModel | None:
     """None where the first cells are more than these already."""
-    return refine(replace(base, samples=_POINTS), tasks, count) if count >= base.states else None
+    return (
+        refine(replace(base, samples=RESOLUTION_SAMPLES), tasks, count)
+        if count >= base.states
+        else None
+    )
 
 
 def _of_task(base: TabularModel, _tasks: Sequence[Task], count: int) -> RefinedModel | None:
     """None likewise."""
-    averaged = replace(base, samples=_POINTS)
+    averaged = replace(base, samples=RESOLUTION_SAMPLES)
     return RefinedModel(averaged, count) if count >= base.states else None
 
 
