@@ -40,7 +40,8 @@ def resolution_memory(settings: Settings) -> float:
     asked = settings.resolution
     if not asked.counts:
         return 0.0
-    compared = _of_cells(settings, max(asked.counts), RESOLUTION_SAMPLES, keeps=False)
+    largest = max((*asked.counts, *(asked.varying or ())))
+    compared = _of_cells(settings, largest, RESOLUTION_SAMPLES, keeps=False)
     return max(compared, _of_cells(settings, asked.finest, 1, keeps=False))
 
 

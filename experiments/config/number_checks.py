@@ -58,8 +58,14 @@ def count_problems(settings: Settings) -> Iterator[str]:
     yield from _division_problems("demonstrations.dt", demonstrations.dt, settings.horizon)
     for i, step in enumerate(settings.models.steps):
         yield from _division_problems(f"models.steps[{i}]", step, settings.horizon)
-    steps, counts = settings.models.steps, settings.resolution.counts
-    for key, values in (("models.steps", steps), ("resolution.counts", counts)):
+    asked = settings.resolution
+    lists: dict[str, tuple[Any, ...]] = {
+        "models.steps": settings.models.steps,
+        "resolution.counts": asked.counts,
+        "resolution.varying": asked.varying or (),
+        "resolution.kinds": asked.kinds,
+    }
+    for key, values in lists.items():
         if len(set(values)) < len(values):
             yield f"{key}: {list(values)} holds a value twice; give each once"
 
@@ -102,18 +108,19 @@ def resolution_problems(settings: Settings) -> Iterator[str]:
     if needed > there:
         asked = settings.resolution
         yield (
-            f"resolution.counts: {list(asked.counts)} and {asked.finest} of resolution.finest with "
+            f"resolution.counts: {list(asked.counts)}, resolution.varying: "
+            f"{list(asked.varying or asked.counts)} and resolution.finest: {asked.finest} with "
             f"{list(settings.action_counts)} actions take about {needed:.3g} GB, and this machine "
             f"has {there:.3g}; compare fewer cells, or use fewer actions"
         )
 
 
-def refined_problems(settings: ModelSettings) -> Iterator[str]:
+def refined_problems(settings: ModelSettings | AdviceSettings) -> Iterator[str]:
     """Cells of each task's own that no refinement leads to."""
     refined, first = settings.grid.refined, math.prod(settings.grid.shape)
     if not refined:
         return
-    if settings.sampling is not None:
+    if isinstance(settings, ModelSettings) and settings.sampling is not None:
         yield (
             f"grid.refined: {refined}, but model=sampled has no cells; set it to 0, or take "
             "model=tabular"

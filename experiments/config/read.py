@@ -170,7 +170,7 @@ def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
     settings = checked(AdviceSettings, _without(tree, unused))
     _refuse(advice_count_problems(settings))
     _refuse(advice_shape_problems(settings))
-    _refuse(budget_problems(settings))
+    _refuse(budget_problems(settings), refined_problems(settings))
     return settings
 
 
