@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy  # loads scipy.special when it is first used
 
+from mlci.cells.protocol import check_has_cells
 from mlci.spaces import Floats
 from mlci.tabular import TabularModel
 
@@ -72,7 +73,12 @@ class Diagnosis:
 
 
 def diagnose(model: TabularModel) -> Diagnosis:
-    """Measure how a tabular model moves; see `Diagnosis`."""
+    """Measure how a tabular model moves; see `Diagnosis`.
+
+    Raises:
+        TypeError: a model without cells that all tasks share, or with cells that are not equal.
+    """
+    check_has_cells(model)
     grid, actions = model.equal_cells, model.actions
     stays, taken, crossed, changing = 0, 0, 0.0, np.zeros(len(grid.shape))
     for block in model.blocks():

@@ -57,7 +57,7 @@ def explore(
     _ = model.substeps  # counted once
     reach = Displacements.of(model, n_jobs) if bounded else None
     row = np.full(model.states, -1)  # of a cell among those whose moves are known
-    leads: list[Ints] = []  # cells that moves of each lead to
+    leads: list[Ints] = []  # cells that moves of each lead to, some more than once
     cells: list[Ints] = []
     parts: list[MergedMoves] = []
     for way in ways:
@@ -73,10 +73,13 @@ def explore(
                 cells.append(block)
                 parts.append(merged)
                 row[block] = len(leads) + np.arange(len(block))
-                leads += map(np.unique, np.split(merged.successor, merged.begins[1:-1]))
+                leads += np.split(merged.successor, merged.begins[1:-1])
                 if progress is not None:
                     progress(len(leads))
-            now = np.unique(np.concatenate([leads[i] for i in row[now]])) if len(now) else now
+            reached = np.zeros(model.states, dtype=bool)
+            for i in row[now].tolist():
+                reached[leads[i]] = True
+            now = np.flatnonzero(reached)
     explored = Explored(row >= 0, tuple((*way.first_cells, way.goal) for way in ways))
     result = replace(model, explored=explored)
     if parts:

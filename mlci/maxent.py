@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mlci.cells.protocol import check_has_cells
 from mlci.demonstrations import Task
 from mlci.end_moves import first_moves, last_moves, only_moves
 from mlci.joint_avoidance import log_avoidance_beside
@@ -98,12 +99,11 @@ class TrajectoryDistribution:
             exact_ends: begin and end at states, not at cells.
 
         Raises:
-            TypeError: a model without cells.
+            TypeError: a model without cells that all tasks share.
             ValueError: a start outside the state space, or a horizon that dt does not divide (to a
                 thousandth of a step, as recorded times are rounded).
         """
-        if not hasattr(model, "grid"):
-            raise TypeError(f"this needs a TabularModel; a {type(model).__name__} has no cells")
+        check_has_cells(model)
         start = int(model.grid.index(task.start))
         if start < 0:
             raise ValueError(f"the start {task.start} lies outside the state space")

@@ -71,7 +71,7 @@ def backward_levels(
     states, last = reachable.shape[1], len(reachable) - 1
     log_z = np.full(reachable.shape, -np.inf)
     log_z[last, goal[reachable[last, goal]]] = 0.0
-    levels = np.empty((2, states, regions))
+    levels = np.zeros((2, states, regions))  # numbers, so that who subtracts is not warned
     levels[last % 2, goal] = 1.0
     yield last, levels[last % 2]
     for moves, early, late in reversed(legs):

@@ -22,6 +22,7 @@ _COPIES_OF_PATHS, _COPIES_OF_CROSSINGS = 6, 3  # of sampled paths, at most, whil
 # Of a first guess and step: paths, their derivatives, gains, and candidates of the line search;
 # measured with 2 and 4 states and half as many controls.
 _NUMBERS_A_DIMENSION = 22
+RESOLUTION_SAMPLES = 2  # start points along each dimension of a cell, where kinds are compared
 _BYTES_AT_REST = 200_000_000  # the interpreter, its packages, and blocks of work
 
 
@@ -29,17 +30,34 @@ def expected_memory(settings: ModelSettings) -> float:
     """Bytes that a point takes at most for its model and the inference."""
     if settings.sampling is not None:
         return _of_samples(settings, settings.sampling.most)
+    cells, samples = settings.grid.refined, settings.transition.samples
+    if cells:
+        return _of_cells(settings, cells, samples, keeps=False)
     cells = math.prod(settings.grid.shape)
-    dimensions = settings.model.space.dimension
+    moves = math.prod(settings.action_counts) * samples**settings.model.space.dimension
+    return _of_cells(settings, cells, samples, keeps=moves_are_kept(float(cells), moves))
+
+
+def resolution_memory(settings: Settings) -> float:
+    """Bytes that comparing kinds of cells takes at most; 0 if nothing is compared."""
+    asked = settings.resolution
+    if not asked.counts:
+        return 0.0
+    largest = max((*asked.counts, *(asked.varying or ())))
+    compared = _of_cells(settings, largest, RESOLUTION_SAMPLES, keeps=False)
+    return max(compared, _of_cells(settings, asked.finest, 1, keeps=False))
+
+
+def _of_cells(settings: ModelSettings, cells: int, samples: int, *, keeps: bool) -> float:
+    """Bytes that a model of so many cells takes, whether or not it keeps each of its moves."""
     actions = math.prod(settings.action_counts)
-    moves = actions * settings.transition.samples**dimensions
+    moves = actions * samples**settings.model.space.dimension
     merged = min(moves, _MERGED_AN_ACTION * actions)
-    is_kept = moves_are_kept(float(cells), moves)
     hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
     hypotheses += settings.hypotheses.count
     steps = settings.horizon / settings.dt if isinstance(settings, Settings) else 0
     return (
-        float(cells) * (moves * _BYTES_A_MOVE if is_kept else merged * _BYTES_A_MERGED_MOVE)
+        float(cells) * (moves * _BYTES_A_MOVE if keeps else merged * _BYTES_A_MERGED_MOVE)
         + float(cells) * steps * _BYTES_A_STEP
         + float(hypotheses) * _BYTES_A_HYPOTHESIS
         + min(ALPHA_BYTES, float(cells) * hypotheses * 16)

@@ -11,7 +11,12 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from experiments.config.memory import expected_memory, machine_memory, trial_memory
+from experiments.config.memory import (
+    expected_memory,
+    machine_memory,
+    resolution_memory,
+    trial_memory,
+)
 from experiments.config.settings import (
     AdviceSettings,
     ModelSettings,
@@ -58,8 +63,14 @@ def count_problems(settings: Settings) -> Iterator[str]:
     yield from _division_problems("demonstrations.dt", demonstrations.dt, settings.horizon)
     for i, step in enumerate(settings.models.steps):
         yield from _division_problems(f"models.steps[{i}]", step, settings.horizon)
-    steps, counts = settings.models.steps, settings.resolution.counts
-    for key, values in (("models.steps", steps), ("resolution.counts", counts)):
+    asked = settings.resolution
+    lists: dict[str, tuple[Any, ...]] = {
+        "models.steps": settings.models.steps,
+        "resolution.counts": asked.counts,
+        "resolution.varying": asked.varying or (),
+        "resolution.kinds": asked.kinds,
+    }
+    for key, values in lists.items():
         if len(set(values)) < len(values):
             yield f"{key}: {list(values)} holds a value twice; give each once"
 
@@ -86,8 +97,11 @@ def size_problems(settings: ModelSettings) -> Iterator[str]:
             f"{there:.3g}; lower sampled.most, sampled.substeps or hypotheses, or raise dt"
         )
     elif needed > there:
+        key = f"grid.shape: {list(settings.grid.shape)}"
+        if settings.grid.refined:
+            key = f"grid.refined: {settings.grid.refined} cells"
         yield (
-            f"grid.shape: {list(settings.grid.shape)} with {list(settings.action_counts)} actions, "
+            f"{key} with {list(settings.action_counts)} actions, "
             f"{settings.transition.samples} samples and these hypotheses takes about {needed:.3g} "
             f"GB, and this machine has {there:.3g}; use fewer cells, actions, samples or hypotheses"
         )
@@ -107,6 +121,41 @@ def trial_problems(settings: Settings) -> Iterator[str]:
             )
 
 
+def resolution_problems(settings: Settings) -> Iterator[str]:
+    """Kinds of cells that are too many to hold, or too few to begin with."""
+    needed, there = resolution_memory(settings) / 1e9, machine_memory() / 1e9
+    if needed > there:
+        asked = settings.resolution
+        yield (
+            f"resolution.counts: {list(asked.counts)}, resolution.varying: "
+            f"{list(asked.varying or asked.counts)} and resolution.finest: {asked.finest} with "
+            f"{list(settings.action_counts)} actions take about {needed:.3g} GB, and this machine "
+            f"has {there:.3g}; compare fewer cells, or use fewer actions"
+        )
+
+
+def refined_problems(settings: ModelSettings | AdviceSettings) -> Iterator[str]:
+    """Cells of each task's own that no refinement leads to."""
+    refined, first = settings.grid.refined, math.prod(settings.grid.shape)
+    if not refined:
+        return
+    if isinstance(settings, ModelSettings) and settings.sampling is not None:
+        yield (
+            f"grid.refined: {refined}, but model=sampled has no cells; set it to 0, or take "
+            "model=tabular"
+        )
+    if refined < first:
+        yield (
+            f"grid.refined: {refined} is less than the {first} cells of grid.shape, with which "
+            "refinement begins; raise it, or lower grid.shape"
+        )
+    if any(settings.grid.offset or ()):
+        yield (
+            f"grid.offset: {list(settings.grid.offset or ())}, but refined cells begin at the "
+            "bounds of the space; use null"
+        )
+
+
 def soft_problems(settings: RecordedSettings) -> Iterator[str]:
     """Weights need every single move, which a large model does not keep."""
     moves = settings.transition.samples ** len(settings.grid.shape)
@@ -119,7 +168,7 @@ def soft_problems(settings: RecordedSettings) -> Iterator[str]:
 
 
 def point_cell_problems(settings: Settings) -> Iterator[str]:
-    """What a point asks of cells, where paths are sampled."""
+    """What a point asks of cells that all tasks share, where there are none."""
     asked = {
         "next_task.repetitions": (settings.next_task.repetitions, 0),
         "baselines.paths": (settings.baselines.paths, 0),
@@ -131,7 +180,7 @@ def point_cell_problems(settings: Settings) -> Iterator[str]:
 
 
 def recorded_cell_problems(settings: RecordedSettings) -> Iterator[str]:
-    """What is asked of cells beside recorded demonstrations, where paths are sampled."""
+    """What is asked of such cells beside recorded demonstrations."""
     asked = {
         "soft": (settings.soft, 0),
         "estimate_temperature": (settings.estimate_temperature, False),
@@ -140,27 +189,33 @@ def recorded_cell_problems(settings: RecordedSettings) -> Iterator[str]:
 
 
 def _cell_problems(settings: ModelSettings, asked: Mapping[str, tuple[Any, Any]]) -> Iterator[str]:
-    """What needs cells though there are none, by its key: its value, and the one that asks nothing.
+    """What needs cells that all tasks share, by its key: its value, and the one that asks nothing.
 
-    Also a budget that is smaller than what is drawn at once.
+    Also a budget of samples that is smaller than what is drawn at once.
     """
-    sampling = settings.sampling
-    if sampling is None:
+    sampling, refined = settings.sampling, settings.grid.refined
+    if sampling is None and not refined:
         return
+    words, way = "needs cells, and model=sampled has none", "take model=tabular"
+    if sampling is None:
+        words, way = "needs cells that all tasks share, and has none", "set grid.refined to 0"
+    else:
+        asked = {
+            "inference.exact_ends": (settings.inference.exact_ends, True),
+            "transition.samples": (settings.transition.samples, 1),
+            **asked,
+        }
     asked = {
-        "inference.exact_ends": (settings.inference.exact_ends, True),
         "inference.shapes.count": (settings.inference.shapes.count, 0),
-        "transition.samples": (settings.transition.samples, 1),
         "hypotheses.controls.ranges": (list(settings.hypotheses.controls.ranges), []),
         "hypotheses.controls.shares": (list(settings.hypotheses.controls.shares), []),
         **asked,
     }
     for key, (value, nothing) in asked.items():
         if value != nothing:
-            yield (
-                f"{key}: {_word(value)} needs cells, and model=sampled has none; set it to "
-                f"{_word(nothing)}, or take model=tabular"
-            )
+            yield (f"{key}: {_word(value)} {words}; set it to {_word(nothing)}, or {way}")
+    if sampling is None:
+        return
     bounds = settings.model.space.bounds
     largest = float(max(abs(bounds.lower).max(), abs(bounds.upper).max()))
     if largest - sampling.tolerance == largest:

@@ -27,6 +27,8 @@ from experiments.config.number_checks import (
     count_problems,
     point_cell_problems,
     recorded_cell_problems,
+    refined_problems,
+    resolution_problems,
     size_problems,
     soft_problems,
     study_problems,
@@ -88,6 +90,7 @@ def read_config(tree: Mapping[str, Any]) -> tuple[Settings, StudySettings]:
     _refuse(study_problems(study), count_problems(settings), point_cell_problems(settings))
     _refuse(shape_problems(settings), point_shape_problems(settings), truth_problems(settings))
     _refuse(size_problems(settings), trial_problems(settings))
+    _refuse(refined_problems(settings), resolution_problems(settings))
     _refuse(hypothesis_problems(settings), control_truth_problems(settings))
     _refuse(control_hypothesis_problems(settings))
     _refuse(safe_set_problems(settings))
@@ -134,7 +137,7 @@ def read_recorded_config(tree: Mapping[str, Any]) -> RecordedSettings:
         recorded_cell_problems(settings),
     )
     _refuse(control_hypothesis_problems(settings))
-    _refuse(size_problems(settings), soft_problems(settings))
+    _refuse(size_problems(settings), soft_problems(settings), refined_problems(settings))
     return settings
 
 
@@ -169,7 +172,7 @@ def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
     settings = checked(AdviceSettings, _without(tree, unused))
     _refuse(advice_count_problems(settings))
     _refuse(advice_shape_problems(settings))
-    _refuse(budget_problems(settings))
+    _refuse(budget_problems(settings), refined_problems(settings))
     return settings
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
 from experiments.point.streams import Purpose, stream
+from mlci.cells.refined_model import RefinedModel
 from mlci.demonstrations import Demonstration
 from mlci.maxent import TrajectoryDistribution
 from mlci.metrics import final_state_error, violation_distance
-from mlci.models import Model
+from mlci.models import Model, distribution_of
 from mlci.sampled.distribution import SampledModel
 from mlci.simulate import rollout
 from mlci.spaces import Bools, Floats, Ints
@@ -56,7 +57,7 @@ class _UnderTruth:
         feasible: (N,) whether it can do each.
         phi: (F, C') probability that it violates each of its regions, of the feasible ones.
         error: (F,) mean final-state error of sampled trajectories.
-        trajectories: as of `Measures`; none where there are no cells.
+        trajectories: as of `Measures`; none without cells that all tasks share.
     """
 
     feasible: Bools
@@ -89,12 +90,15 @@ def _under_truth(model: Model, settings: Settings, point: PointInference) -> _Un
 
 
 @_under_truth.register
-def _of_cells(model: TabularModel, settings: Settings, point: PointInference) -> _UnderTruth:
+def _of_cells(
+    model: TabularModel | RefinedModel, settings: Settings, point: PointInference
+) -> _UnderTruth:
     model = model.under(point.truth)
     feasible = np.zeros(len(point.demonstrations), dtype=bool)
     phi, trajectories, controls, done = [], {}, [], []
     for j, demonstration in enumerate(point.demonstrations):
-        distribution = TrajectoryDistribution.of_task(model, demonstration.task)
+        distribution = distribution_of(model, demonstration.task, exact_ends=False)
+        assert isinstance(distribution, TrajectoryDistribution)  # there are cells
         if not distribution.is_possible:
             continue
         feasible[j] = True
@@ -103,8 +107,9 @@ def _of_cells(model: TabularModel, settings: Settings, point: PointInference) ->
         cells, moves = distribution.sample(
             settings.rollouts, stream(settings.seed, Purpose.ROLLOUTS, number)
         )
-        trajectories[number] = cells[0], moves[0]
-        controls.append(model.actions[model.action[moves]])
+        if isinstance(model, TabularModel):
+            trajectories[number] = cells[0], moves[0]
+        controls.append(distribution.model.actions[distribution.model.action[moves]])
         done.append(demonstration)
     error = np.zeros(0)
     if done:

@@ -10,12 +10,13 @@ import numpy as np
 
 from experiments.config.settings import AdviceSettings
 from experiments.terminal import entry
+from mlci.cells.refined_model import RefinedModel
 from mlci.demonstrations import Demonstration
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.sampled.diagnosis import SamplingDiagnosis
 from mlci.sampled.distribution import SampledModel
-from mlci.spaces import Box
+from mlci.spaces import Box, Floats
 from mlci.tabular import TabularModel, discretize
 
 _TOO_FAR = 3.0  # times what samples explain: cells are off
@@ -32,6 +33,8 @@ class ModelChoice:
         apart: root mean square difference of Phi between cells and paths; None where cells cannot
             do the task, or none are recommended.
         largest: the largest of these differences.
+        refined: how many cells of the task's own were tried; 0 for none.
+        refined_apart: `apart` of these; None where they cannot do the task.
     """
 
     task_s: float
@@ -39,9 +42,28 @@ class ModelChoice:
     error: float = np.nan
     apart: float | None = None
     largest: float = np.nan
+    refined: int = 0
+    refined_apart: float | None = None
 
     def lines(self) -> list[str]:
         """What was found, and which model to take when, a phrase a line."""
+        found = self._lines()
+        if self.refined and self.samples is not None:
+            found.append(f"grid.refined={self.refined}: {self._of_refined}")
+        return found
+
+    @property
+    def _of_refined(self) -> str:
+        """How near cells of the task's own come to sampled paths."""
+        if self.refined_apart is None:
+            return "these cells cannot do the task"
+        return (
+            f"cells of the task's own differ from these paths by {self.refined_apart:.2g} (root "
+            "mean square over regions)"
+        )
+
+    def _lines(self) -> list[str]:
+        """The same without refined cells."""
         if self.samples is None:
             return [f"model=tabular: no sampled path does the task ({self.task_s:.2g} s)"]
         paths = (
@@ -97,11 +119,22 @@ def compare_models(
         return ModelChoice(time.process_time() - before, None)
     phi, errors = sampled.violation_probabilities(), sampled.avoidance_errors()
     spent, error = time.process_time() - before, float(np.sqrt(np.mean(np.square(errors))))
+    refined_apart = None
+    if settings.grid.refined:
+        by_refined = refined_cells(settings, cells, dt).distribution(task)
+        if by_refined.is_possible:
+            refined_apart, _ = _apart(by_refined.violation_probabilities(), phi)
+    refined = settings.grid.refined, refined_apart
     if by_cells is None:
-        return ModelChoice(spent, sampled.diagnosis, error)
-    apart = by_cells.violation_probabilities() - phi
-    rms, largest = float(np.sqrt(np.mean(np.square(apart)))), float(np.max(np.abs(apart)))
-    return ModelChoice(spent, sampled.diagnosis, error, rms, largest)
+        return ModelChoice(spent, sampled.diagnosis, error, None, np.nan, *refined)
+    apart = _apart(by_cells.violation_probabilities(), phi)
+    return ModelChoice(spent, sampled.diagnosis, error, *apart, *refined)
+
+
+def _apart(one: Floats, other: Floats) -> tuple[float, float]:
+    """Root mean square and largest difference."""
+    difference = np.abs(one - other)
+    return float(np.sqrt(np.mean(np.square(difference)))), float(np.max(difference))
 
 
 def choose_model(
@@ -116,6 +149,19 @@ def choose_model(
     for number, phrase in enumerate(choice.lines()):
         for line in entry("" if number else "cells or paths", phrase):
             log(line)
+
+
+def refined_cells(settings: AdviceSettings, cells: TabularModel | None, dt: float) -> RefinedModel:
+    """Cells of each task's own, as the settings say; moves start as in some cells."""
+    model = TabularModel(
+        settings.model,
+        Grid(settings.model.space, settings.grid.shape),
+        settings.action_values,
+        dt,
+        settings.candidates,
+        samples=settings.remedy if cells is None else cells.samples,
+    )
+    return RefinedModel(model, settings.grid.refined)
 
 
 def formed_cells(settings: AdviceSettings, grid: Grid, dt: float, samples: int) -> TabularModel:

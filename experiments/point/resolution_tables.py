@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
+from experiments.config.memory import RESOLUTION_SAMPLES
 from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
+from experiments.progress import begin
 from mlci.cells.goal_cells import goal_tree
 from mlci.cells.multilinear import MultilinearModel
 from mlci.cells.refined_model import RefinedModel
 from mlci.cells.refinement import refine
 from mlci.demonstrations import Task
+from mlci.exploration import explore
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.sampled.distribution import SampledModel
@@ -26,7 +29,6 @@ CENTRE, AVERAGED, MULTILINEAR = "centre", "averaged", "multilinear"
 ROUND_GOALS, VARYING, OF_TASK = "round goals", "varying", "of each task"
 Cells = TabularModel | RefinedModel
 
-_POINTS = 2  # start points along each dimension of a cell, where there are several
 _TOLERANCE = 0.02  # of the goal, where paths are sampled: a fifth of a cell, to be near a point
 
 
@@ -40,8 +42,8 @@ def resolution_table(settings: Settings, point: PointInference) -> pd.DataFrame:
         alone; `count` of cells; `task`; whether it is `possible`; over
         the hypotheses the root mean square `error` of Phi against paths sampled without cells,
         whose own standard error is the `noise`, and whether they can be `trusted`; and likewise
-        `error_of_cells`, against very many equal cells with the same actions. Where a task is not
-        possible, Phi is taken to be 0.
+        `error_of_cells`, against very many equal cells with the same actions, NaN without them.
+        Where a task is not possible, Phi is taken to be 0.
     """
     asked, regions = settings.resolution, settings.candidates
     tasks = [each.task for each in point.demonstrations[: asked.tasks]]
@@ -74,14 +76,17 @@ def resolution_table(settings: Settings, point: PointInference) -> pd.DataFrame:
         regions,
         temperature=settings.temperature,
     )
-    finest = replace(base, grid=_scaled(settings.cells, asked.finest))
-    limit = [_phi(way) for way in _ways(finest, tasks)]
+    limit = np.full_like(reference, np.nan)
+    if asked.finest:
+        finest = replace(base, grid=_scaled(settings.cells, asked.finest))
+        limit = np.array([_phi(way) for way in _ways(finest, tasks)])
     rows = []
-    for count in asked.counts:
-        for kind, make in _KINDS.items():
-            model = make(base, tasks, count)
+    for kind in asked.kinds:
+        for count in _counts(settings, kind):
+            model = _KINDS[kind](base, tasks, count)
             if model is None:
                 continue
+            begin(f"{count} cells, {kind}")
             for number, way in enumerate(_ways(model, tasks)):
                 phi = _phi(way)
                 rows.append(
@@ -99,17 +104,30 @@ def resolution_table(settings: Settings, point: PointInference) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
+def _counts(settings: Settings, kind: str) -> tuple[int, ...]:
+    """Numbers of cells of a kind."""
+    asked = settings.resolution
+    if kind in (VARYING, OF_TASK) and asked.varying is not None:
+        return asked.varying
+    return asked.counts
+
+
 def _scaled(grid: Grid, count: int) -> Grid:
     """A grid of about so many cells, in the same proportions."""
     factor = (count / grid.size) ** (1 / len(grid.shape))
     return Grid(grid.space, tuple(max(1, round(factor * each)) for each in grid.shape))
 
 
-def _ways(model: Cells, tasks: Sequence[Task]) -> list[TrajectoryDistribution]:
-    """The distributions of tasks."""
+def _ways(model: Cells, tasks: Sequence[Task]) -> Iterator[TrajectoryDistribution]:
+    """The distributions of tasks, one after the other; of equal cells, only those are followed that
+    the tasks come by."""
     if isinstance(model, RefinedModel):
-        return [model.distribution(task) for task in tasks]
-    return [TrajectoryDistribution.of_task(model, task, exact_ends=True) for task in tasks]
+        yield from map(model.distribution, tasks)
+        return
+    if type(model) is TabularModel and isinstance(model.grid, Grid):
+        model = explore(model, tasks)
+    for task in tasks:
+        yield TrajectoryDistribution.of_task(model, task, exact_ends=True)
 
 
 def _phi(way: TrajectoryDistribution) -> Floats:
@@ -131,7 +149,7 @@ def _centre(base: TabularModel, _tasks: Sequence[Task], count: int) -> TabularMo
 
 
 def _averaged(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularModel:
-    return replace(_centre(base, tasks, count), samples=_POINTS)
+    return replace(_centre(base, tasks, count), samples=RESOLUTION_SAMPLES)
 
 
 def _multilinear(base: TabularModel, _tasks: Sequence[Task], count: int) -> TabularModel:
@@ -148,17 +166,21 @@ def _multilinear(base: TabularModel, _tasks: Sequence[Task], count: int) -> Tabu
 def _round_goals(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularModel:
     grid = _scaled(base.equal_cells, count)
     tree = goal_tree(grid, [task.goal for task in tasks], grid.widths)
-    return replace(base, grid=tree, samples=_POINTS)
+    return replace(base, grid=tree, samples=RESOLUTION_SAMPLES)
 
 
 def _varying(base: TabularModel, tasks: Sequence[Task], count: int) -> TabularModel | None:
     """None where the first cells are more than these already."""
-    return refine(replace(base, samples=_POINTS), tasks, count) if count >= base.states else None
+    return (
+        refine(replace(base, samples=RESOLUTION_SAMPLES), tasks, count)
+        if count >= base.states
+        else None
+    )
 
 
 def _of_task(base: TabularModel, _tasks: Sequence[Task], count: int) -> RefinedModel | None:
     """None likewise."""
-    averaged = replace(base, samples=_POINTS)
+    averaged = replace(base, samples=RESOLUTION_SAMPLES)
     return RefinedModel(averaged, count) if count >= base.states else None
 
 

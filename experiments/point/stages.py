@@ -22,6 +22,7 @@ import mlci.shapes.half_spaces
 import mlci.tabular
 from experiments.config.settings import ModelSettings, Settings, ShapeList, SubjectSettings
 from experiments.tracking.store import Store, Stored
+from mlci.cells.refined_model import RefinedModel
 from mlci.grids import Grid
 from mlci.models import Model
 from mlci.regions import Regions
@@ -71,16 +72,19 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
 
 def inference_model(settings: Settings, store: Store) -> Model:
     """What tells how probable regions are; its regions are the hypotheses and then the truth's."""
-    if settings.sampling is None:
+    regions = settings.candidates.joined(settings.constraint)
+    if settings.sampling is None and not settings.grid.refined:
         return tabular_model(settings, store)
-    return sampled_model(settings, settings.candidates.joined(settings.constraint))
+    return formed_model(settings, regions)
 
 
 def formed_model(settings: ModelSettings, regions: Regions) -> Model:
     """The same with some regions, formed anew."""
-    if settings.sampling is None:
-        return discretized_model(settings, regions)
-    return sampled_model(settings, regions)
+    if settings.sampling is not None:
+        return sampled_model(settings, regions)
+    if settings.grid.refined:
+        return RefinedModel(model_of_cells(settings, regions), settings.grid.refined)
+    return discretized_model(settings, regions)
 
 
 def sampled_model(settings: ModelSettings, regions: Regions) -> SampledModel:
@@ -108,15 +112,7 @@ def sampled_model(settings: ModelSettings, regions: Regions) -> SampledModel:
 def tabular_model(settings: Settings, store: Store) -> TabularModel:
     """The tabular model (1); its regions are the hypotheses and then the truth's boxes."""
     hypotheses, truth = settings.candidates, settings.constraint
-    model = TabularModel(
-        system=settings.model,
-        grid=settings.cells,
-        actions=settings.action_values,
-        dt=settings.dt,
-        regions=hypotheses.joined(truth),
-        samples=settings.transition.samples,
-        temperature=settings.temperature,
-    )
+    model = model_of_cells(settings, hypotheses.joined(truth))
     if not moves_are_kept(model.states, model.moves):
         return discretized_model(settings, model.regions)
     stored = _discretized(settings, store, "mdp", hypotheses, (*_MOVES, *_CROSSINGS))
@@ -131,6 +127,19 @@ def tabular_model(settings: Settings, store: Store) -> TabularModel:
     ]
     joined = sparse.hstack(crosses, format="csr")
     return replace(model, kept=SingleMoves(stored["successor"], stored["reward"], joined))
+
+
+def model_of_cells(settings: ModelSettings, regions: Regions) -> TabularModel:
+    """The tabular model of equal cells with some regions, whose moves are not formed yet."""
+    return TabularModel(
+        system=settings.model,
+        grid=settings.cells,
+        actions=settings.action_values,
+        dt=settings.dt,
+        regions=regions,
+        samples=settings.transition.samples,
+        temperature=settings.temperature,
+    )
 
 
 def model_inputs(settings: ModelSettings, regions: Regions) -> tuple[Any, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 import scipy  # loads scipy.sparse when it is first used
 
 from mlci.actuation.hypotheses import ControlHypotheses
+from mlci.cells.protocol import check_has_cells
 from mlci.demonstrations import Task
 from mlci.end_moves import MovePaths, allowed_moves, first_paths, last_paths, only_paths
 from mlci.maxent import TrajectoryDistribution
@@ -51,8 +52,7 @@ class ControlledMoves:
             ValueError: hypotheses about another system, or one that forbids no move, so that the
                 model cannot tell.
         """
-        if not hasattr(model, "grid"):
-            raise TypeError(f"this needs a TabularModel; a {type(model).__name__} has no cells")
+        check_has_cells(model)
         hypotheses.check(model.system)
         count, parts = np.zeros(len(hypotheses)), []
         for cells in model.blocks():

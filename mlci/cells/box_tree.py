@@ -138,8 +138,9 @@ class BoxTree:
 
     @cached_property
     def widths(self) -> Floats:
-        """(n,) least side length of a cell along each dimension."""
-        return np.asarray(np.min(self.sides, axis=0))
+        """(n,) side length of a cell along each dimension, the geometric mean: a cell that is thin
+        only because two goals nearly meet there says nothing of the others."""
+        return np.asarray(np.exp(np.mean(np.log(self.sides), axis=0)))
 
     def index(self, states: ArrayLike) -> Ints:
         """Number (...,) of the cell that holds each of states (..., n), or -1 outside and for NaN.

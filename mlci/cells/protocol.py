@@ -22,7 +22,7 @@ class Cells(Protocol):
 
     @property
     def widths(self) -> Floats:
-        """(n,) side lengths of a cell; where they differ, the least along each dimension."""
+        """(n,) side lengths of a cell; where they differ, their geometric mean."""
 
     @property
     def centers(self) -> Floats:
@@ -40,3 +40,16 @@ class Cells(Protocol):
 
     def cells_in(self, region: Box) -> Ints:
         """Numbers of the cells that a region meets, sorted."""
+
+
+def check_has_cells(model: object) -> None:
+    """See that a model has one set of cells for all tasks.
+
+    Raises:
+        TypeError: it samples paths, or refines cells for each task.
+    """
+    if not hasattr(model, "grid"):
+        raise TypeError(
+            f"this needs a TabularModel; a {type(model).__name__} has no cells that all tasks "
+            "share: take a TabularModel of equal cells"
+        )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from numpy.typing import ArrayLike
 
 from mlci.cells.refinement import check_cells, refine
 from mlci.demonstrations import Task
@@ -52,6 +54,14 @@ class RefinedModel:
     def temperature(self) -> float:
         """Temperature of the agent."""
         return self.model.temperature
+
+    def under(self, truth: ArrayLike) -> RefinedModel:
+        """The model under constraints, equation (3): cells are refined where these let tasks lead.
+
+        Args:
+            truth: as of `TabularModel.under`.
+        """
+        return replace(self, model=self.model.under(truth))
 
     def distribution(
         self, task: Task, *, round_horizon: bool = False, exact_ends: bool = True

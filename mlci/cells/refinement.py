@@ -14,6 +14,8 @@ from mlci.demonstrations import Task
 from mlci.maxent import TrajectoryDistribution
 from mlci.tabular import Progress, TabularModel
 
+MOST_MOVES = 1 << 28  # of all cells: some ten gigabytes, and hours
+
 
 def refine(
     model: TabularModel,
@@ -39,8 +41,8 @@ def refine(
         progress: called with how many cells there are, and how many there shall be.
 
     Raises:
-        ValueError: no task, a number of cells that is not whole or less than there are, a growth
-            outside (0, 1], or a task that the model cannot describe.
+        ValueError: no task, a number of cells that is not whole, less than there are or too large,
+            a growth outside (0, 1], or a task that the model cannot describe.
         TypeError: a model that has more than cells and start points, such as a multilinear one.
     """
     check_cells(model, cells)
@@ -79,7 +81,7 @@ def check_cells(model: TabularModel, cells: int) -> None:
     """Whether a model can be refined to so many cells.
 
     Raises:
-        ValueError: a number that is not whole, or less than there are.
+        ValueError: a number that is not whole, less than there are, or too large.
         TypeError: another model than a `TabularModel`.
     """
     if type(model) is not TabularModel:
@@ -88,6 +90,12 @@ def check_cells(model: TabularModel, cells: int) -> None:
         raise ValueError(f"a number of cells is whole, not {cells!r}")
     if cells < model.states:
         raise ValueError(f"there are {model.states} cells already: ask for more than {cells}")
+    if cells * model.moves > MOST_MOVES:
+        raise ValueError(
+            f"{cells} cells of {model.moves} moves have more than the {MOST_MOVES} moves that can "
+            f"be followed: ask for at most {MOST_MOVES // model.moves} cells, or take fewer "
+            "actions or start points"
+        )
 
 
 def _first_tree(model: TabularModel, tasks: Sequence[Task], cells: int) -> BoxTree:

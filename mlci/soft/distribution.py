@@ -40,6 +40,7 @@ from functools import cached_property
 import numpy as np
 import scipy  # loads scipy.sparse when it is first used
 
+from mlci.cells.protocol import check_has_cells
 from mlci.end_moves import MovePaths, allowed_moves, first_paths, last_paths, only_paths
 from mlci.maxent import TrajectoryDistribution
 from mlci.merged_moves import MergedMoves, merge_moves
@@ -184,8 +185,10 @@ def soften(model: TabularModel, region: int) -> SoftModel:
         region: number of the region.
 
     Raises:
+        TypeError: a model without cells that all tasks share.
         ValueError: the model keeps no moves.
     """
+    check_has_cells(model)
     if model.kept is None:  # the check says so, before anything is computed
         return SoftModel(model, region, np.zeros((model.states, model.moves)))
     return SoftModel(model, region, move_times(model, region))

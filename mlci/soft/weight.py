@@ -21,6 +21,7 @@ import numpy as np
 import scipy  # loads scipy.interpolate when it is first used: most commands never do
 from numpy.typing import ArrayLike
 
+from mlci.cells.protocol import check_has_cells
 from mlci.demonstrations import Demonstration
 from mlci.evidence import DEFAULT_MODEL_ERROR, PAPER, TIE, Rates
 from mlci.inference import Inference
@@ -221,8 +222,10 @@ def estimate_weights(
         exact_ends: as of `infer`.
 
     Raises:
+        TypeError: a model without cells that all tasks share.
         ValueError: the model keeps no moves.
     """
+    check_has_cells(model)
     shape = len(demonstrations), len(inference.hypotheses)
     if inference.avoidance.shape != shape:
         raise ValueError(

@@ -167,6 +167,17 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         (Figure("cells", "cell_errors", "Error of Phi against the number of cells."),),
     ),
     (
+        "Cells of varying size in four dimensions",
+        section_cells.telescope_section,
+        (
+            Figure(
+                "cells_telescope",
+                "cell_errors",
+                "Error of Phi of the telescoping pendulum against the number of cells.",
+            ),
+        ),
+    ),
+    (
         "Calibration of the posterior",
         section_beliefs.section,
         (Figure("calibration", "calibration_diagram", "Share that is right against probability."),),

@@ -8,8 +8,8 @@ from paper_figures.cell_errors import KINDS, PANELS, TABLES, error_rows, slope
 from paper_figures.report.markdown import between, number, table
 from paper_figures.report.study_tables import Results
 
-STUDY = "cells"
-_MANY, _FEW = 1600, 400  # equal cells, and varying ones that are to do as well
+# Equal cells, and varying ones that are to do as well.
+_PENDULUM, _TELESCOPE = (1600, 400), (300_000, 60_000)
 
 
 def section(results: Results) -> str:
@@ -18,7 +18,21 @@ def section(results: Results) -> str:
     Raises:
         Missing: the study `cells` is not there yet.
     """
-    rows = error_rows(results.table(STUDY, "resolution", TABLES["resolution"]))
+    return _section(results, "cells", 2, *_PENDULUM)
+
+
+def telescope_section(results: Results) -> str:
+    """The same in four dimensions.
+
+    Raises:
+        Missing: the study `cells_telescope` is not there yet.
+    """
+    return _section(results, "cells_telescope", 4, *_TELESCOPE)
+
+
+def _section(results: Results, study: str, dimensions: int, many: int, few: int) -> str:
+    """What a study of a system of so many dimensions says, and of the target."""
+    rows = error_rows(results.table(study, "resolution", TABLES["resolution"]))
     parts = [
         "Equal cells with moves from their centres, averaged over start points in a cell, or "
         "multilinear: shared among the cells around the end of a move. *Goals in the middle* are "
@@ -26,24 +40,26 @@ def section(results: Results) -> str:
         "begin so, and are halved where the tasks are likely to lead: those of a seed "
         "together, or each task on cells of its own. The error is the root mean "
         "square over hypotheses and tasks, with a 95 % interval over tasks; the order is the power "
-        "of the number of cells with which it falls, and twice that in the width of a cell of two "
-        "dimensions.",
-        _target(rows),
+        f"of the number of cells with which it falls, and {dimensions} times that in the width of "
+        f"a cell of {dimensions} dimensions. What sampled paths err by is taken off.",
+        _target(rows, many, few),
     ]
     for reference, title in PANELS.items():
+        if not (rows["reference"] == reference).any():
+            continue
         parts.append(f"Error {title}:\n\n{_table(rows[rows['reference'] == reference])}")
     return "\n\n".join(parts)
 
 
-def _target(rows: pd.DataFrame) -> str:
+def _target(rows: pd.DataFrame, most: int, least: int) -> str:
     """Whether few varying cells do as well as many equal ones, a line a reference."""
     lines = []
     for reference, title in PANELS.items():
         some = rows[rows["reference"] == reference]
         equal = some[some["kind"].isin(["centre", "averaged"])]
-        near = equal[(equal["count"] / _MANY).between(0.9, 1.1)]
+        near = equal[(equal["count"] / most).between(0.9, 1.1)]
         for kind in ("varying", "of each task"):
-            varying = some[(some["kind"] == kind) & (some["count"] <= _FEW)]
+            varying = some[(some["kind"] == kind) & (some["count"] <= least)]
             if not len(near) or not len(varying):
                 continue
             many, few = near.loc[near["error"].idxmin()], varying.loc[varying["error"].idxmin()]
@@ -61,6 +77,8 @@ def _table(rows: pd.DataFrame) -> str:
     lines, levels = [], max(len(some) for _, some in rows.groupby("kind"))
     for kind, label in KINDS.items():
         some = rows[rows["kind"] == kind].sort_values("count")
+        if not len(some):
+            continue
         each = [f"{row['count']:.0f}: {_error(row)}" for _, row in some.iterrows()]
         order = slope(some)
         lines.append([label, *each, *[""] * (levels - len(each)), f"{order:.2f}"])

@@ -3,6 +3,7 @@
 from experiments.config.settings.advice import AdviceSettings
 from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
+from experiments.config.settings.cells import GridSettings, TransitionSettings
 from experiments.config.settings.controls import ControlHypothesesSettings, ControlRange
 from experiments.config.settings.dynamics import DynamicsSettings
 from experiments.config.settings.kinds import ESTIMATE
@@ -10,7 +11,6 @@ from experiments.config.settings.parts import (
     NO_TRUTH,
     CalibrationSettings,
     DemonstrationSettings,
-    GridSettings,
     HypothesesSettings,
     InferenceSettings,
     NextTaskSettings,
@@ -19,7 +19,6 @@ from experiments.config.settings.parts import (
     SetSettings,
     TaskBoxSettings,
     TaskSettings,
-    TransitionSettings,
     TruthSettings,
 )
 from experiments.config.settings.point import ModelSettings, Settings, SubjectSettings

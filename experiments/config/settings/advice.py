@@ -7,8 +7,9 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from experiments.config.settings.cells import GridSettings, Shape
 from experiments.config.settings.kinds import STRICT, Count, Positive, Seed, about
-from experiments.config.settings.parts import GridSettings, Shape, TaskSettings
+from experiments.config.settings.parts import TaskSettings
 from experiments.config.settings.point import SubjectSettings
 from mlci.grids import Grid
 

@@ -9,6 +9,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.area_shapes import AreaShapeSettings
+from experiments.config.settings.cells import Shape
 from experiments.config.settings.controls import ControlHypothesesSettings, ForbiddenControls
 from experiments.config.settings.kinds import (
     STRICT,
@@ -32,8 +33,6 @@ from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 
 NO_TRUTH = "none"  # the truth's name where nothing is forbidden
-
-Shape = Annotated[tuple[Count, ...], Field(min_length=1)]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -96,29 +95,6 @@ class TruthSettings(ShapeList):
     def label(self) -> str:
         """The name, with the number of the hypothesis."""
         return self.name if self.cell is None else f"{self.name}_{self.cell}"
-
-
-@dataclass(frozen=True, config=STRICT)
-class GridSettings:
-    """The cells of the tabular model."""
-
-    shape: Annotated[Shape, about("cells of the tabular model along each dimension")]
-    offset: Annotated[
-        tuple[Share, ...] | None,
-        about(
-            "shift of the cells along each dimension, periodic ones only; null is none",
-            "share of a cell",
-        ),
-    ]
-
-
-@dataclass(frozen=True, config=STRICT)
-class TransitionSettings:
-    """How transitions of the tabular model start."""
-
-    samples: Annotated[
-        Count, about("start points in a cell along each dimension; 1 is the cell's centre alone")
-    ]
 
 
 @dataclass(frozen=True, config=STRICT)

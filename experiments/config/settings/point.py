@@ -12,6 +12,7 @@ from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
+from experiments.config.settings.cells import GridSettings, Shape, TransitionSettings
 from experiments.config.settings.constraint import SoftSettings, TransferSettings
 from experiments.config.settings.controls import ranges_of
 from experiments.config.settings.dynamics import DynamicsSettings
@@ -28,15 +29,12 @@ from experiments.config.settings.kinds import (
 from experiments.config.settings.parts import (
     CalibrationSettings,
     DemonstrationSettings,
-    GridSettings,
     HypothesesSettings,
     InferenceSettings,
     NextTaskSettings,
     RankSettings,
     SafetySettings,
-    Shape,
     TaskSettings,
-    TransitionSettings,
     TruthSettings,
 )
 from experiments.config.settings.reality import RealitySettings, read_reality
@@ -219,7 +217,7 @@ class Settings(ModelSettings):
             return {"truth": self.truth.label, **kind, "seed": self.seed}
         return {
             "truth": self.truth.label,
-            "cells": math.prod(self.grid.shape),
+            "cells": self.grid.refined or math.prod(self.grid.shape),
             "actions": actions if isinstance(actions, int) else "x".join(map(str, actions)),
             "dt": self.dt,
             "samples": self.transition.samples,

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from experiments.config.settings.kinds import STRICT, Count, about
+from experiments.config.settings.kinds import STRICT, Count, CountOrNone, about
+
+CellKind = Literal["centre", "averaged", "multilinear", "round goals", "varying", "of each task"]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -20,9 +23,20 @@ class ResolutionSettings:
             "cells keep the proportions of `grid.shape`, and varying ones begin with it"
         ),
     ]
+    varying: Annotated[
+        tuple[Count, ...] | None,
+        about("numbers of cells of varying size; null is those of `counts`"),
+    ]
+    kinds: Annotated[
+        Annotated[tuple[CellKind, ...], Field(min_length=1)],
+        about("kinds of cells that are compared"),
+    ]
     tasks: Annotated[Count, about("the first so many demonstrations' tasks are compared on")]
     paths: Annotated[Count, about("sampled paths of a task, the reference without cells")]
     finest: Annotated[
-        Count,
-        about("equal cells that stand for the limit of the same actions, the other reference"),
+        CountOrNone,
+        about(
+            "equal cells that stand for the limit of the same actions, the other reference; 0 does "
+            "without"
+        ),
     ]

@@ -24,7 +24,7 @@ def test_a_model_takes_no_more_than_expected_and_not_much_less(
     # So that blocks of work do not count.
     monkeypatch.setattr("mlci.tabular._MOVES_AT_ONCE", 1 << 13)
     large = dataclasses.replace(
-        settings, grid=GridSettings((160, 100), None), actions=9, dt=0.1, horizon=2.0
+        settings, grid=GridSettings((160, 100), None, 0), actions=9, dt=0.1, horizon=2.0
     )
     monkeypatch.setattr(memory, "_BYTES_AT_REST", 0)
     violation_probabilities(settings)  # loops are compiled, which takes memory once
@@ -49,7 +49,7 @@ def violation_probabilities(settings: Settings) -> Floats:
 def test_every_axis_of_size_counts(settings: Settings) -> None:
     few = expected_memory(settings)
     for changes in (
-        {"grid": GridSettings((1200, 8), None)},
+        {"grid": GridSettings((1200, 8), None, 0)},
         {"actions": 300},
         {"dt": 0.0005},
         {"transition": dataclasses.replace(settings.transition, samples=10)},

@@ -13,6 +13,7 @@ from mlci.cells.multilinear import MultilinearModel
 from mlci.cells.refinement import refine
 from mlci.exploration import explore
 from mlci.maxent import TrajectoryDistribution
+from mlci.temperature import estimate_temperature
 
 PENDULUM = mlci.Pendulum()
 HYPOTHESES = mlci.Regions.from_grid(PENDULUM.space, (10, 10))
@@ -184,6 +185,56 @@ def test_what_cannot_be_refined_is_refused() -> None:
         refine(shared, TASKS, 250)
     with pytest.raises(TypeError, match="not of a MultilinearModel"):
         mlci.RefinedModel(shared, 250)
+    for huge in (lambda: refine(model(), TASKS, 10**9), lambda: mlci.RefinedModel(model(), 10**9)):
+        with pytest.raises(ValueError, match="1000000000 cells of 28 moves have more than the"):
+            huge()
     for cells in (np.nan, np.inf, 250.5):
         with pytest.raises(ValueError, match="a number of cells is whole, not"):
             refine(model(), TASKS, cells)
+
+
+def test_refined_cells_that_are_all_equal_are_those_of_the_grid() -> None:
+    """A goal of whole cells leaves them as they are."""
+    corner = PENDULUM.space.bounds.lower + GRID.widths * (4, 5)
+    task = mlci.Task(TASKS[0].start, mlci.Box(corner, corner + GRID.widths), 3.0)
+    own = mlci.prepare(mlci.RefinedModel(model(), GRID.size), [task])
+    assert own.reachable.all()
+    assert own.avoidance == pytest.approx(mlci.prepare(model(), [task]).avoidance, abs=1e-12)
+
+
+def test_refined_cells_under_a_truth_are_those_of_the_constrained_agent() -> None:
+    truth = np.zeros(len(HYPOTHESES), dtype=bool)
+    truth[36] = True
+    own = mlci.RefinedModel(model(), 150)
+    free, constrained = (each.distribution(TASKS[0]) for each in (own, own.under(truth)))
+    assert 0 < free.avoidance_probabilities()[36] < 1
+    assert constrained.avoidance_probabilities()[36] == 1
+    tree = refine(model().under(truth), TASKS[:1], 150).grid
+    assert np.array_equal(constrained.model.grid.centers, tree.centers)
+
+
+def test_a_sliver_between_goals_does_not_decide_how_finely_moves_are_followed() -> None:
+    middle, half = np.array([2.7, -0.4]), GRID.widths / 2
+    goals = [mlci.Box(middle - half + shift, middle + half + shift) for shift in (0.0, 1e-5)]
+    tree = goal_tree(GRID, goals, GRID.widths)
+    assert np.min(tree.sides) < 1.1e-5
+    assert model(tree).substeps <= 2 * model().substeps
+
+
+def test_what_needs_the_same_cells_for_all_tasks_says_so() -> None:
+    own = mlci.RefinedModel(model(), 150)
+    path = mlci.Demonstration.from_path(np.linspace(TASKS[0].start, TASKS[0].goal.lower, 31), 0.1)
+    inference = mlci.infer(own, [path])
+    limits = mlci.ControlRanges.beyond(PENDULUM, [0.5])
+    for ask in (
+        lambda: mlci.diagnose(own),
+        lambda: mlci.soften(own, 0),
+        lambda: mlci.estimate_weights(own, [path], inference),
+        lambda: estimate_temperature(own, [path], inference),
+        lambda: mlci.infer_controls(own, [path], limits),
+        lambda: explore(own, TASKS),
+    ):
+        with pytest.raises(TypeError, match="a RefinedModel has no cells that all tasks share"):
+            ask()
+    with pytest.raises(TypeError, match="needs a Grid of equal cells, not a BoxTree"):
+        mlci.diagnose(refine(model(), TASKS, 150))
