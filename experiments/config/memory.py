@@ -32,8 +32,7 @@ def expected_memory(settings: ModelSettings) -> float:
     moves = actions * settings.transition.samples**dimensions
     merged = min(moves, _MERGED_AN_ACTION * actions)
     is_kept = moves_are_kept(float(cells), moves)
-    hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
-    hypotheses += settings.hypotheses.count
+    hypotheses = settings.hypotheses.number
     steps = settings.horizon / settings.dt if isinstance(settings, Settings) else 0
     return (
         float(cells) * (moves * _BYTES_A_MOVE if is_kept else merged * _BYTES_A_MERGED_MOVE)
@@ -53,8 +52,7 @@ def _of_samples(settings: ModelSettings, samples: int) -> float:
         return _BYTES_AT_REST
     steps = settings.horizon / settings.dt
     numbers = steps * settings.sampling.substeps * settings.model.space.dimension
-    hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
-    hypotheses += settings.hypotheses.count
+    hypotheses = settings.hypotheses.number
     copies = _COPIES_OF_PATHS * numbers + _COPIES_OF_CROSSINGS * hypotheses
     return samples * copies * 8 + _BYTES_AT_REST
 
