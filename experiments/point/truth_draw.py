@@ -17,7 +17,7 @@ from experiments.point.stages import region_inputs, shape_modules, system_module
 from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
 
-_TASKS, _FEWEST = 60, 10  # of a seed, and those of them that cross a truth that is drawn for it
+_TASKS, _OFTEN = 60, 10  # of a seed, and those of them that are to cross its truth
 _LEAST = 0.1  # share of the tasks that a truth must touch: else hardly a demonstration tells of it
 
 
@@ -44,14 +44,15 @@ def with_truth(settings: Settings, store: Store) -> Settings:
     """A point whose truth is to be drawn, with the hypothesis that is; any other as it is.
 
     Drawn at random of all hypotheses that at least 10 of the first 60 tasks of the point's seed
-    cross where nothing is forbidden, between ends outside of them.
+    cross where nothing is forbidden, between ends outside of them; where none is crossed so often,
+    of those that are crossed most.
 
     Args:
         settings: the point.
         store: where it is kept what tasks cross.
 
     Raises:
-        NoAnswer: no hypothesis is crossed so often.
+        NoAnswer: no task crosses any hypothesis.
     """
     if not settings.truth.is_drawn:
         return settings
@@ -62,12 +63,13 @@ def with_truth(settings: Settings, store: Store) -> Settings:
     modules = [mlci.demonstrator, system_module(settings.model), sys.modules[__name__]]
     modules += shape_modules(settings, settings.candidates)
     crossed = store.get("truth_draw", draw_inputs(settings), modules, compute)["crossed"]
-    often = np.flatnonzero(crossed >= _FEWEST)
-    if not len(often):
+    most = int(np.max(crossed))
+    if most == 0:
         raise NoAnswer(
-            f"of {_TASKS} tasks at most {int(np.max(crossed))} cross the same hypothesis, which "
-            f"must be {_FEWEST} for a truth to be drawn: widen tasks or hypotheses"
+            f"none of {_TASKS} tasks crosses a hypothesis between ends outside of it, so that no "
+            "truth can be drawn: widen tasks, or narrow hypotheses"
         )
+    often = np.flatnonzero(crossed >= min(_OFTEN, most))
     cell = int(stream(settings.seed, Purpose.TRUTH, 0).choice(often))
     return replace(settings, truth=replace(settings.truth, cell=cell))
 

@@ -2,8 +2,8 @@
 
 Arms are the outer links of conf/system/arm6.yaml, from one to six. A row has processor time of one
 thread: of the search for modes; of drawing and weighing paths without refits, which is what grows
-with samples, steps and modes; and of the whole task with Phi of ten hypotheses. Each row is measured
-in a process of its own, whose peak memory is therefore its own. The table goes to
+with samples, steps and modes; and of the whole task with Phi of ten hypotheses. Each row is
+measured in a process of its own, whose peak memory is therefore its own. The table goes to
 results/dimensions/tables/dimensions.csv; `--results DIR` names another folder of results.
 """
 

@@ -97,7 +97,7 @@ class TruthSettings(ShapeList):
         IndexOrDrawn | None,
         about(
             "or one of the hypotheses, by its number; `drawn` takes, for each seed, one at random "
-            "of those that a sixth of its tasks cross where nothing is forbidden"
+            "of those that a sixth of its tasks cross where nothing is forbidden, or the most"
         ),
     ]
     controls: ForbiddenControls
