@@ -51,9 +51,7 @@ def draw(dimensions: pd.DataFrame) -> Figure:
         cubic = rows["task_s"].iloc[-1] * (rows["value"] / rows["value"].iloc[-1]) ** 3
         left.plot(rows["value"], cubic, color=GUIDE, linestyle=":", linewidth=0.8, label="slope 3")
         left.set_ylabel("processor time [s]")
-        middle.plot(
-            rows["value"], rows["peak_mb"], color="black", marker="^", label="sampled paths"
-        )
+        middle.plot(rows["value"], rows["peak_mb"], "k^-", label="sampled paths")
         middle.plot(
             rows["value"],
             grid_megabytes(rows["value"]),
@@ -108,10 +106,10 @@ def facts(dimensions: pd.DataFrame) -> str:
     first, rows = dimensions.iloc[0], dimensions[dimensions["factor"] == "dimensions"]
     lines = [
         "One task of chains of one to six links, of which each has two dimensions, without a grid:",
-        "processor time of one thread (left), peak memory of the process beside that of a grid with",
-        f"one number for each of {CELLS} cells a dimension (middle), and the time to draw and weigh",
-        "paths against what makes it longer (right). One run a size, the quickest of three for the",
-        "search and for drawing, so that times have no intervals.",
+        "processor time of one thread (left), peak memory of the process beside that of a grid",
+        f"with one number a cell, {CELLS} cells a dimension (middle), and the time to draw and",
+        "weigh paths against what makes it longer (right). One run a size, the quickest of three",
+        "for the search and for drawing, so that times have no intervals.",
     ]
     for row in rows.sort_values("value").itertuples():
         lines.append(

@@ -201,9 +201,7 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         "Arms and bodies",
         section_arms.section,
         (
-            Figure(
-                "arms", "arms", "How often the truth is found, and whether forecasts come true."
-            ),
+            Figure("arms", "arms", "How often the truth is found, and what comes true."),
             Figure("dimensions", "dimensions", "Time and memory from 2 to 12 dimensions."),
         ),
     ),

@@ -36,8 +36,8 @@ def section(results: Results) -> str:
     rows, forecasts = worlds(models, summary, cases), of_cases(scored, cases)
     return (
         "Each world draws tasks at random, and as its truth one of the hypotheses, ranges of two "
-        "joints at any speed, that at least a sixth of its tasks cross where nothing is forbidden; where none is crossed so "
-        "often, of those that are crossed most. "
+        "joints at any speed, that at least a sixth of its tasks cross where nothing is forbidden, "
+        "or, where none is crossed so often, of those that are crossed most. "
         "A demonstrator who brakes a joint in time, which needs no grid, does tasks that cross the "
         "truth, and the first five that are kept are what inference sees. It samples paths: there "
         "are no cells. No world is left out.\n\n"
