@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlci.control.control_problem import ControlFilter
+from mlci.control.control_problem import ControlFilter, SafeStates
 from mlci.control.ilqr import Solution, optimize
 from mlci.demonstrations import REACHED, Demonstration, Task, even_times
 from mlci.regions import Regions
-from mlci.safety.reachability import SafeSet
 from mlci.simulate import EULER, Integrator, rollout, step_count
 from mlci.spaces import Bools, Box, Floats
 from mlci.systems import System
@@ -82,7 +81,7 @@ class Attempt:
 
 def sample_trials(
     system: System,
-    safe_set: SafeSet | None,
+    safe_set: SafeStates | None,
     start_box: Box,
     *,
     trials: int,
@@ -259,7 +258,7 @@ def enters(system: System, truth: Regions, states: Floats, controls: Floats, dt:
 
 
 def _draw_safe(
-    rng: np.random.Generator, box: Box, safe_set: SafeSet | None, margin: float
+    rng: np.random.Generator, box: Box, safe_set: SafeStates | None, margin: float
 ) -> Floats:
     """A state (n,), uniform in the part of a box that is safe."""
     for _ in range(_DRAWS):

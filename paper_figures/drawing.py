@@ -27,12 +27,14 @@ from experiments.tracking.names import inner_path, is_name
 from experiments.tracking.study_tables import TableError, read_tables
 from paper_figures import (
     area_cover,
+    arms,
     baselines,
     calibration_diagram,
     cell_errors,
     choice_effects,
     chosen_tasks,
     control_limits,
+    dimensions,
     dynamics,
     early_overlap,
     final_state_error,
@@ -92,6 +94,8 @@ FIGURES: Mapping[str, ModuleType] = {
         success_cases,
         baselines,
         dynamics,
+        arms,
+        dimensions,
     )
 }
 

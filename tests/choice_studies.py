@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from arm_study import arm_tables, dimension_tables
 from constraint_studies import control_tables, resolution_tables, soft_tables, transfer_tables
 from dynamics_study import dynamics
 from figure_study import cell_boxes, dimension_rows, path_rows, region_rows
@@ -312,6 +313,8 @@ def choice_tables() -> dict[str, dict[str, pd.DataFrame]]:
         "control_limits": control_tables(),
         "cell_errors": resolution_tables(),
         "sampled_models": sampled_tables(),
+        "arms": arm_tables(),
+        "dimensions": dimension_tables(),
         "dynamics": success_rule.success_tables(dynamics()),
         "area_cover": area_cover_tables(),
         "baselines": {"baseline_differences": baseline_differences()},

@@ -113,7 +113,7 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
         CollateError: a point lacks the table, or has other columns than the first.
     """
     columns = points[0].columns(name)
-    if several := len({point.config.get("system.target") for point in points}) > 1:
+    if several := len({_system(point) for point in points}) > 1:
         columns = list(dict.fromkeys(each for point in points for each in point.columns(name)))
     opening = list(takewhile(points[0].opening.__contains__, columns))
     groups = [[point] for point in points]
@@ -136,6 +136,11 @@ def joined_parts(name: str, points: Sequence[FinishedPoint]) -> Iterable[bytes]:
                 f"not {','.join(columns)}"
             )
         yield _opened(point, name, front)
+
+
+def _system(point: FinishedPoint) -> tuple[Any, ...]:
+    """The system of a point: its class and arguments, which may change what its states are."""
+    return tuple(value for key, value in point.config.items() if key.startswith("system."))
 
 
 def _filled(

@@ -53,8 +53,7 @@ def _of_cells(settings: ModelSettings, cells: int, samples: int, *, keeps: bool)
     actions = math.prod(settings.action_counts)
     moves = actions * samples**settings.model.space.dimension
     merged = min(moves, _MERGED_AN_ACTION * actions)
-    hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
-    hypotheses += settings.hypotheses.count
+    hypotheses = settings.hypotheses.number
     steps = settings.horizon / settings.dt if isinstance(settings, Settings) else 0
     return (
         float(cells) * (moves * _BYTES_A_MOVE if keeps else merged * _BYTES_A_MERGED_MOVE)
@@ -74,8 +73,7 @@ def _of_samples(settings: ModelSettings, samples: int) -> float:
         return _BYTES_AT_REST
     steps = settings.horizon / settings.dt
     numbers = steps * settings.sampling.substeps * settings.model.space.dimension
-    hypotheses = math.prod(count or 1 for count in settings.hypotheses.shape or (0,))
-    hypotheses += settings.hypotheses.count
+    hypotheses = settings.hypotheses.number
     copies = _COPIES_OF_PATHS * numbers + _COPIES_OF_CROSSINGS * hypotheses
     return samples * copies * 8 + _BYTES_AT_REST
 

@@ -127,6 +127,8 @@ def _subject_problems(settings: SubjectSettings) -> Iterator[str]:
     space, controls = settings.model.space, settings.model.control_box.dimension
     if settings.hypotheses.shape is not None:
         yield from _length_problems("hypotheses.shape", settings.hypotheses.shape, space)
+    for i, cells in enumerate(settings.hypotheses.grids):
+        yield from _length_problems(f"hypotheses.grids[{i}]", cells, space)
     if not isinstance(settings.actions, int) and len(settings.actions) != controls:
         yield f"actions: {list(settings.actions)} must be one number, or a list of {controls}"
     ranges = settings.action_range
@@ -136,7 +138,7 @@ def _subject_problems(settings: SubjectSettings) -> Iterator[str]:
             "lower and a higher value"
         )
     yield from _listed_problems("hypotheses", settings.hypotheses, space)
-    if settings.hypotheses.shape is None and not settings.hypotheses.count:
+    if not settings.hypotheses.shapes_of_grids and not settings.hypotheses.count:
         yield "hypotheses: no shape and no boxes; give a shape, for a grid of cells, or boxes"
 
 

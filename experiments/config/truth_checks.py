@@ -10,9 +10,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from experiments.config.settings import NO_TRUTH, Settings
+from experiments.config.settings import BARRIER, ESCAPES, NO_TRUTH, Settings
 from experiments.tracking.names import is_name
 from mlci.grids import Grid
+from mlci.regions import Regions
 from mlci.spaces import Box
 from mlci.system_check import check_affine
 
@@ -79,9 +80,11 @@ def _questions_without_regions(settings: Settings) -> Iterator[str]:
 def hypothesis_problems(settings: Settings) -> Iterator[str]:
     """A truth that no hypothesis stands for."""
     count = len(settings.candidates)
-    if settings.truth.cell is not None and settings.truth.cell >= count:
+    if settings.truth.is_drawn:
+        return
+    if settings.truth.number is not None and settings.truth.number >= count:
         yield (
-            f"truth.cell: {settings.truth.cell} is not the number of a hypothesis; there are "
+            f"truth.cell: {settings.truth.number} is not the number of a hypothesis; there are "
             f"{count}, from 0 to {count - 1}"
         )
         return
@@ -96,16 +99,18 @@ def hypothesis_problems(settings: Settings) -> Iterator[str]:
 def safe_set_problems(settings: Settings) -> Iterator[str]:
     """A wide border, dynamics without a safe set, and a grid that is too fine or too coarse."""
     safety, space = settings.safety, settings.model.space
-    if len(settings.constraint):
+    # One that is drawn is some hypothesis, none of which holds all states but where it is alone.
+    possible = settings.candidates if settings.truth.is_drawn else settings.constraint
+    if len(possible):
         states = np.random.default_rng(0).uniform(
             space.bounds.lower, space.bounds.upper, (_PROBES, space.dimension)
         )
         try:
-            distances = settings.constraint.signed_distance(states)
+            distances = possible.signed_distance(states)
         except ValueError as error:
             yield f"truth.shapes: {error}"
             return
-        if np.all(distances <= 0):
+        if np.all(distances <= 0) and not settings.truth.is_drawn:
             yield f"truth.boxes: {settings.truth.name} forbids every state; make its boxes smaller"
             return
         try:
@@ -119,22 +124,50 @@ def safe_set_problems(settings: Settings) -> Iterator[str]:
                 f"safety.{key}: {value:g} is more than the state space is wide, {widest:.6g}; "
                 "lower it"
             )
-    if math.prod(safety.shape) > _MOST_VALUES:
+    if safety.method == BARRIER:
+        yield from _barrier_problems(settings, possible)
+    elif math.prod(safety.shape) > _MOST_VALUES:
         yield f"safety.shape: {list(safety.shape)} makes too many values; use fewer"
-    elif safety.method == "equation":
-        grid = Grid(space, safety.shape)
-        for i in range(len(settings.constraint)):
-            if not settings.constraint.are_boxes[i]:
-                if np.all(settings.constraint.shape(i).level(space, grid.centers) >= 0):
-                    yield (
-                        f"safety.shape: {list(safety.shape)} has no cell centre inside the truth's "
-                        f"region {i}; use more cells"
-                    )
-            elif names := " and ".join(_missed(settings.constraint.box(i), grid)):
+    elif safety.method != ESCAPES:
+        yield from _coarse_grid_problems(possible, Grid(space, safety.shape))
+
+
+def _barrier_problems(settings: Settings, possible: Regions) -> Iterator[str]:
+    """What a barrier knows no way for: other systems and truths, limits of torques, a blend."""
+    if len(possible):
+        try:
+            settings.safety.barrier(
+                settings.real_system.build(), possible, settings.demonstrations.dt
+            )
+        except ValueError as error:
+            yield (
+                f"safety.method: barrier, but {error}; take escapes, or equation where a grid can "
+                "hold the state space"
+            )
+    if settings.control_limit is not None:
+        yield (
+            "safety.method: barrier, but it brakes with any torque, and demonstrations.clip or "
+            "truth.controls limit these; take escapes, or lift the limit"
+        )
+    if settings.safety.width:
+        yield f"safety.width: {settings.safety.width:g}, but a barrier has no blend; set it to 0"
+
+
+def _coarse_grid_problems(truth: Regions, grid: Grid) -> Iterator[str]:
+    """Regions of a truth that lie between the centres of the safe set's cells."""
+    shape = list(grid.shape)
+    for i in range(len(truth)):
+        if not truth.are_boxes[i]:
+            if np.all(truth.shape(i).level(grid.space, grid.centers) >= 0):
                 yield (
-                    f"safety.shape: {list(safety.shape)} has no cell centre inside the truth's box "
-                    f"{i} along {names}; use more cells"
+                    f"safety.shape: {shape} has no cell centre inside the truth's region {i}; use "
+                    "more cells"
                 )
+        elif names := " and ".join(_missed(truth.box(i), grid)):
+            yield (
+                f"safety.shape: {shape} has no cell centre inside the truth's box {i} along "
+                f"{names}; use more cells"
+            )
 
 
 def _missed(box: Box, grid: Grid) -> Iterator[str]:

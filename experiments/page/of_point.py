@@ -12,6 +12,7 @@ from experiments.page.beliefs import belief_sentences
 from experiments.page.document import page
 from experiments.page.words import where
 from experiments.point.inference import infer_point, point_answer
+from experiments.point.truth_draw import with_truth
 from experiments.tracking.points import State
 from experiments.tracking.store import Store
 from mlci.inference import Inference
@@ -35,8 +36,9 @@ def point_page(facts: Facts) -> str:
         raise ArchiveError(f"{identity}: has not finished; run it first")
     if facts.state is not State.DONE:
         raise ArchiveError(f"{identity}: the source has changed since it ran; run it again first")
-    settings = settings_of_record(facts.record["config"])
-    inferred = infer_point(settings, Store(facts.point.results / "store"))
+    store = Store(facts.point.results / "store")
+    settings = with_truth(settings_of_record(facts.record["config"]), store)
+    inferred = infer_point(settings, store)
     calibration, names = inferred.calibration, settings.model.space.names
     concerns, tasks = [], len(inferred.numbers)
     if inferred.diagnosis is not None:

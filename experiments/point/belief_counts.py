@@ -48,7 +48,7 @@ def belief_counts(settings: Settings, point: PointInference) -> pd.DataFrame:
         their probabilities (`predicted`), and how many were right (`hits`).
     """
     inference, calibration = point.inference, settings.calibration
-    hypotheses, cell = len(inference.hypotheses), settings.truth.cell
+    hypotheses, cell = len(inference.hypotheses), settings.truth.number
     truth = np.arange(hypotheses) == (-1 if cell is None else cell)
     prior_none = inference.prior_none
     world = {"prior": prior_none if cell is None else (1 - prior_none) / hypotheses}
@@ -119,7 +119,7 @@ def _model_set(
     settings: Settings, point: PointInference, constrained: TabularModel, number: int
 ) -> Inference:
     """Demonstrations from the tabular model under the truth, up to the first that there is not."""
-    world = 0 if settings.truth.cell is None else settings.truth.cell + 1
+    world = 0 if settings.truth.number is None else settings.truth.number + 1
     rng = stream(settings.seed, Purpose.MODEL_DEMONSTRATIONS, world, number)
     avoidance, violated = [], []
     for _ in range(max(settings.calibration.demonstrations)):

@@ -50,7 +50,7 @@ def evidence_table(
         likely hypothesis; whether it is `right`; `log_truth`, the log posterior of what is true,
         LEAST at least; whether the truth is in the `top`, nothing where nothing is forbidden.
     """
-    cell, sizes = settings.truth.cell, settings.calibration.demonstrations
+    cell, sizes = settings.truth.number, settings.calibration.demonstrations
     hypotheses, prior_none = len(point.inference.hypotheses), point.inference.prior_none
     prior = prior_none if cell is None else (1 - prior_none) / hypotheses
     rng = stream(settings.seed, Purpose.EVIDENCE, 0 if cell is None else cell + 1)

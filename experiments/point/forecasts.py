@@ -68,15 +68,23 @@ def forecast_calibration(settings: Settings, store: Store) -> Calibration:
     return _calibration(store.get("forecasts", forecast_inputs(settings), modules, compute))
 
 
-def free_demonstrations(settings: Settings, trials: int = TRIALS) -> list[Demonstration]:
-    """What the demonstrator that inference knows of does of some tasks without a constraint."""
+def free_demonstrations(
+    settings: Settings, trials: int = TRIALS, seed: int = SEED
+) -> list[Demonstration]:
+    """What the demonstrator that inference knows of does of some tasks without a constraint.
+
+    Args:
+        settings: the point.
+        trials: number of tasks, some of which may fail.
+        seed: of the tasks: by default those of no study.
+    """
     system, demonstrator = settings.model, settings.demonstrations
     tasks = sample_trials(
         system,
         None,
         settings.tasks.start_box(system.space),
         trials=trials,
-        seed=SEED,
+        seed=seed,
         horizon=settings.horizon,
         dt=demonstrator.dt,
         goal_offsets=settings.tasks.goal_offsets,

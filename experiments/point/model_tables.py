@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.config.settings import Settings
-from experiments.point.forecasts import free_demonstrations
+from experiments.point.forecasts import SEED, free_demonstrations
 from experiments.point.inference import PointInference
 from experiments.point.stages import formed_model
 from experiments.progress import begin
@@ -18,6 +18,7 @@ from mlci.preparation import PreparedInference, prepare
 from mlci.rank_errors import rank_errors
 from mlci.spaces import Floats
 
+_BINS = ("lower", "upper", "count", "forecast", "crossed")
 _ROUNDED = 1e-3  # forecasts nearer to 0 or 1 are scored as this
 
 
@@ -29,12 +30,16 @@ def model_tables(settings: Settings, point: PointInference) -> dict[str, pd.Data
         `possible` ones; scores of its forecasts for these, `brier` and `log_score`, each with
         `_low` and `_high`, and `off_by`; with all demonstrations the `rank` of the truth, which
         samples leave between `rank_lowest` and `rank_highest`, and how many of the first ranks are
-        `settled`; of the samples `effective`, the median over tasks, and `doubted`, tasks whose
-        samples are not to be believed. `halving`, if `models.steps` asks, a row a demonstration
+        `settled`; posterior probabilities of the truth (`posterior`), of the first hypothesis
+        (`claim`) and of no constraint (`none`); of the samples `effective`, the median over tasks,
+        and `doubted`, tasks whose samples are not to be believed. `scored`, a row a bin of the
+        forecasts that were scored: `lower`, `upper`, `count`, the mean `forecast`, and the share
+        that was `crossed`. `halving`, if `models.steps` asks, a row a demonstration
         and time step: the mean square `change` of Phi to the next `shorter` one, and the part of it
         that is `noise` of samples.
     """
-    tables = {"models": pd.DataFrame([{**_scores(settings, point), **_sampling(settings, point)}])}
+    row, bins = _scores(settings, point)
+    tables = {"models": pd.DataFrame([{**row, **_sampling(settings, point)}]), "scored": bins}
     if settings.models.steps:
         tables["halving"] = halving_table(settings, point)
     return tables
@@ -70,11 +75,12 @@ def _noise(prepared: PreparedInference) -> Floats:
     return np.asarray(np.mean(np.maximum(np.square(sampling.errors) - allowance, 0), axis=1))
 
 
-def _scores(settings: Settings, point: PointInference) -> dict[str, float]:
-    """How good its forecasts are of demonstrators whom nothing constrains."""
+def _scores(settings: Settings, point: PointInference) -> tuple[dict[str, float], pd.DataFrame]:
+    """How good its forecasts are of demonstrators whom nothing constrains; and the bins of them."""
     begin("scoring forecasts")
     trials = min(settings.models.trials, settings.demonstrations.keep)
-    done = free_demonstrations(settings, trials)
+    seed = settings.seed if settings.models.seeded else SEED
+    done = free_demonstrations(settings, trials, seed)
     regions = point.inference.hypotheses
     tasks = [each.task for each in done]
     prepared = prepare(
@@ -84,18 +90,21 @@ def _scores(settings: Settings, point: PointInference) -> dict[str, float]:
         exact_ends=settings.inference.exact_ends,
     )
     hits = np.array([regions.violated_by(each.states) for each in done])
+    hits = hits.reshape(len(done), len(regions))
     counts = ~(certain_by_ends(regions, tasks) | prepared.decided_by_cell)
     counts &= prepared.reachable[:, None]
     row: dict[str, float] = {"tasks": len(tasks), "possible": int(np.sum(prepared.reachable))}
     nothing = Score(np.nan, np.nan, np.nan)
     brier, log_score, off_by = nothing, nothing, np.nan
+    bins = pd.DataFrame(columns=list(_BINS))
     if counts.any():
         alpha = np.clip(prepared.avoidance, _ROUNDED, 1 - _ROUNDED)
         scores = score_forecasts(alpha, hits, counts)
         brier, log_score, off_by = scores.brier, scores.log_score, scores.off_by
+        bins = scores.bins[list(_BINS)]
     for name, score in (("brier", brier), ("log_score", log_score)):
         row |= {name: score.mean, f"{name}_low": score.low, f"{name}_high": score.high}
-    return {**row, "off_by": off_by}
+    return {**row, "off_by": off_by}, bins
 
 
 def _sampling(settings: Settings, point: PointInference) -> dict[str, float]:
@@ -103,16 +112,19 @@ def _sampling(settings: Settings, point: PointInference) -> dict[str, float]:
     inference, errors = point.inference, rank_errors(point.inference)
     covered = np.flatnonzero(inference.hypotheses.inside(settings.constraint))
     settled, sampling = errors.settled[inference.order], inference.sampling
-    row = {"rank": np.nan, "rank_lowest": np.nan, "rank_highest": np.nan}
+    row = dict.fromkeys(("rank", "rank_lowest", "rank_highest", "posterior"), np.nan)
     if len(covered):
         best = covered[np.argmin(errors.rank[covered])]
         row = {
             "rank": float(errors.rank[best]),
             "rank_lowest": float(errors.lowest[best]),
             "rank_highest": float(errors.highest[best]),
+            "posterior": float(inference.posterior[best]),
         }
     return {
         **row,
+        "claim": float(inference.posterior[inference.order[0]]),
+        "none": inference.posterior_none,
         "settled": len(settled) if settled.all() else int(np.argmin(settled)),
         "effective": np.nan if sampling is None else float(np.median(sampling.effective)),
         "doubted": np.nan if sampling is None else sum(map(bool, sampling.complaints)),

@@ -20,6 +20,7 @@ from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
 from experiments.point.tables import point_tables
 from experiments.point.transfer_tables import transfer_tables
+from experiments.point.truth_draw import with_truth
 from experiments.progress import begin
 from experiments.terminal import entry
 from experiments.tracking.store import Store
@@ -39,6 +40,7 @@ def run_point(
         Tables by name, see `experiments.point.tables.point_tables`; if asked for,
         those of `transfer_tables` and `dynamics_table`.
     """
+    settings = with_truth(settings, store)
     begin("ranking hypotheses")
     inferred = infer_point(settings, store)
     inference, space, top = inferred.inference, settings.model.space, settings.ranks.top

@@ -20,7 +20,7 @@ import mlci.safety.reachability
 import mlci.shapes.balls
 import mlci.shapes.half_spaces
 import mlci.tabular
-from experiments.config.settings import ModelSettings, Settings, ShapeList, SubjectSettings
+from experiments.config.settings import ESCAPES, ModelSettings, Settings, ShapeList, SubjectSettings
 from experiments.tracking.store import Store, Stored
 from mlci.cells.refined_model import RefinedModel
 from mlci.grids import Grid
@@ -36,8 +36,6 @@ from mlci.tabular import TabularModel, discretize, moves_are_kept
 # What is stored of the moves of a tabular model, and of the sparse matrix of their crossings.
 _MOVES = ("successor", "reward")
 _CROSSINGS = ("indices", "indptr")
-
-ESCAPES = "escapes"  # the safe set from constant controls; else it solves the equation (9)
 
 
 def safe_set_inputs(settings: Settings) -> tuple[Any, ...]:

@@ -27,6 +27,7 @@ class Purpose(IntEnum):
     SOFT = 10
     TRANSFER = 11
     CONTROLS = 12
+    TRUTH = 13
 
 
 def stream(seed: int, purpose: Purpose, *index: int) -> np.random.Generator:

@@ -15,16 +15,14 @@ import numpy as np
 
 import mlci.control.effort
 import mlci.demonstrator
-import mlci.safety.safety_filter
 from experiments.config.settings import Settings
+from experiments.point.keep_out import KeepOut, keep_out
 from experiments.point.no_answer import NoAnswer
-from experiments.point.stages import region_inputs, safe_set, shape_modules, system_module
+from experiments.point.stages import region_inputs, shape_modules, system_module
 from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
 from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.demonstrator import Attempt, Outcome, Trial, crossing, demonstrate, sample_trials
-from mlci.safety.reachability import SafeSet
-from mlci.safety.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import EULER, RK4, step_count
 from mlci.spaces import Bools, Box, Floats, Ints, StateSpace
 
@@ -101,18 +99,14 @@ def demonstration_inputs(settings: Settings, safe_set_key: str | None) -> tuple[
 
 def demonstrations(settings: Settings, store: Store) -> TrialSet:
     """The trials of a truth (8), from the store or computed."""
-    system, dt, safety = settings.real_model, settings.demonstrations.dt, settings.safety
-    omega, omega_key, margin, safety_filter = None, None, safety.margin, None
+    system, kept_out = settings.real_model, None
     if len(settings.constraint):  # where nothing is forbidden, everything is safe
-        omega, omega_key = safe_set(settings, store)
-        margin = border_margin(system, omega, dt) if margin is None else margin
-        integrator = _skill(settings)["integrator"]
-        safety_filter = SafetyFilter(system, omega, dt, margin, safety.width, integrator)
+        kept_out = keep_out(settings, store, _skill(settings)["integrator"])
 
     def compute() -> dict[str, np.ndarray]:
-        trials = _trials(settings, omega, margin or 0.0)
+        trials = _trials(settings, kept_out)
         breaking = rule_breakers(settings)
-        attempts = _attempts(settings, trials, breaking, safety_filter)
+        attempts = _attempts(settings, trials, breaking, kept_out)
         paths = [attempt.demonstration for attempt in attempts]
         recorded = {
             "starts": np.array([path.task.start for path in paths]),
@@ -135,12 +129,12 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
     modules = [
         mlci.demonstrator,
         mlci.control.effort,
-        mlci.safety.safety_filter,
+        *([] if kept_out is None else [kept_out.module]),
         system_module(settings.model),
         sys.modules[__name__],
         *shape_modules(settings, settings.constraint),
     ]
-    inputs = demonstration_inputs(settings, omega_key)
+    inputs = demonstration_inputs(settings, None if kept_out is None else kept_out.key)
     return TrialSet(**store.get("demonstrations", inputs, modules, compute))
 
 
@@ -161,12 +155,13 @@ def _attempts(
     settings: Settings,
     trials: list[Trial],
     breaking: Bools,
-    safety_filter: SafetyFilter | None,
+    kept_out: KeepOut | None,
 ) -> list[Attempt]:
     """What becomes of every trial; who ignores the constraint may enter the truth."""
     attempts: dict[int, Attempt] = {}
     skill = _skill(settings)
     limited = skill | {"limit": settings.control_limit}
+    safety_filter = None if kept_out is None else kept_out.filter
     for members, truth, kept_by, skill_of in (
         (np.flatnonzero(~breaking), settings.constraint, safety_filter, limited),
         (np.flatnonzero(breaking), None, None, skill),
@@ -210,7 +205,7 @@ def _measured(exact: dict[str, Floats], noise: Floats, space: StateSpace) -> dic
     }
 
 
-def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Trial]:
+def _trials(settings: Settings, kept_out: KeepOut | None) -> list[Trial]:
     """The trials that the demonstrator tries.
 
     Raises:
@@ -220,13 +215,13 @@ def _trials(settings: Settings, omega: SafeSet | None, margin: float) -> list[Tr
     draw = partial(
         sample_trials,
         system,
-        omega,
+        None if kept_out is None else kept_out.safe,
         settings.tasks.start_box(system.space),
         trials=demonstrator.pairs,
         seed=settings.seed,
         horizon=settings.horizon,
         dt=demonstrator.dt,
-        margin=margin,
+        margin=0.0 if kept_out is None else kept_out.margin,
         goal_offsets=settings.tasks.goal_offsets,
         restarts=demonstrator.restarts,
         hold=demonstrator.hold,

@@ -19,8 +19,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from mlci.simulate import Integrator
-from mlci.spaces import Box, Floats, Ints
+from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.systems import System
+
+
+class SafeStates(Protocol):
+    """States from which a filter can keep out of a truth for ever, the Omega of (10)."""
+
+    def contains(self, states: Floats, margin: float = 0.0) -> Bools:
+        """Whether states (..., n) are among them, with V at least a margin."""
 
 
 class ControlFilter(Protocol):

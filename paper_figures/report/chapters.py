@@ -13,6 +13,7 @@ from paper_figures.report import (
     claim_5,
     claim_6,
     section_areas,
+    section_arms,
     section_baselines,
     section_beliefs,
     section_cells,
@@ -206,6 +207,14 @@ SECTIONS: tuple[tuple[str, Callable[[Results], str], tuple[Figure, ...]], ...] =
         "With and without a grid",
         section_sampled.section,
         (Figure("sampled", "sampled_models", "Sampled paths beside cells."),),
+    ),
+    (
+        "Arms and bodies",
+        section_arms.section,
+        (
+            Figure("arms", "arms", "How often the truth is found, and what comes true."),
+            Figure("dimensions", "dimensions", "Time and memory from 2 to 12 dimensions."),
+        ),
     ),
     (
         "In-cell sampling at 100 cells",

@@ -18,7 +18,10 @@ from experiments.tracking.trees import plain
 from paper_figures.rows import ACTIONS, SAMPLES
 
 # The commands that make what is in the folders of results.
-COMMANDS = {"benchmark": "make benchmark"}
+COMMANDS = {
+    "benchmark": "make benchmark",
+    "dimensions": "python -m tests.benchmark.dimensions",
+}
 
 # What is read of a study's listing.
 _LISTING = ("points", "sources", "commits", "dirty", "started", "seconds", "peak_memory_mb")

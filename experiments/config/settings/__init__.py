@@ -15,7 +15,6 @@ from experiments.config.settings.parts import (
     InferenceSettings,
     NextTaskSettings,
     RankSettings,
-    SafetySettings,
     SetSettings,
     TaskBoxSettings,
     TaskSettings,
@@ -24,6 +23,7 @@ from experiments.config.settings.parts import (
 from experiments.config.settings.point import ModelSettings, Settings, SubjectSettings
 from experiments.config.settings.reality import RealitySettings
 from experiments.config.settings.recorded import RecordedSettings
+from experiments.config.settings.safety import BARRIER, ESCAPES, SafetySettings
 from experiments.config.settings.sampling import ModelsSettings, SampledSettings
 from experiments.config.settings.shapes import (
     BallSettings,
@@ -37,6 +37,8 @@ from experiments.config.settings.system import SystemSettings, system_class
 from experiments.config.settings.world import TableSettings
 
 __all__ = [
+    "BARRIER",
+    "ESCAPES",
     "ESTIMATE",
     "NO_TRUTH",
     "AdviceSettings",

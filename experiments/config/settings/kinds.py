@@ -83,3 +83,9 @@ ShareOrEstimate = Annotated[
     Annotated[Share, Tag(ONE)] | Annotated[Literal["estimate"], Tag(WORD)],
     Discriminator(lambda value: WORD if value == ESTIMATE else ONE),
 ]
+
+DRAWN = "drawn"  # in place of a number
+IndexOrDrawn = Annotated[
+    Annotated[Index, Tag(ONE)] | Annotated[Literal["drawn"], Tag(WORD)],
+    Discriminator(lambda value: WORD if value == DRAWN else ONE),
+]

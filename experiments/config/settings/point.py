@@ -33,12 +33,12 @@ from experiments.config.settings.parts import (
     InferenceSettings,
     NextTaskSettings,
     RankSettings,
-    SafetySettings,
     TaskSettings,
     TruthSettings,
 )
 from experiments.config.settings.reality import RealitySettings, read_reality
 from experiments.config.settings.resolution import ResolutionSettings
+from experiments.config.settings.safety import SafetySettings
 from experiments.config.settings.sampling import ModelsSettings, SampledSettings
 from experiments.config.settings.shapes import ShapeList
 from experiments.config.settings.system import SystemSettings, read_system
@@ -172,10 +172,14 @@ class Settings(ModelSettings):
 
     @cached_property
     def constraint(self) -> Regions:
-        """The true constraint; a set of no regions where there is none."""
+        """The true constraint; a set of no regions where there is none.
+
+        Raises:
+            ValueError: it is drawn when the point runs.
+        """
         shapes = self.truth.listed()
-        if self.truth.cell is not None:
-            shapes = [self.candidates.shape(self.truth.cell)]
+        if self.truth.number is not None:
+            shapes = [self.candidates.shape(self.truth.number)]
         names = [f"truth_{number}" for number in range(len(shapes))]
         return Regions.from_shapes(self.model.space, shapes, names)
 

@@ -64,6 +64,10 @@ class ModelsSettings:
             "the model are scored, at most demonstrations.keep; 0 asks nothing"
         ),
     ]
+    seeded: Annotated[
+        Flag,
+        about("those tasks are drawn for each seed anew; false takes the same for all, to compare"),
+    ]
     steps: Annotated[
         tuple[Positive, ...],
         about("time steps, of each two of which it is asked how far Phi differs; none asks", "s"),

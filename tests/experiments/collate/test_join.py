@@ -198,6 +198,22 @@ def test_points_of_two_systems_stand_in_one_table(tmp_path: Path) -> None:
     assert len(collated.sources) == len(collated.systems) == 2
 
 
+def test_points_of_two_sizes_of_one_system_stand_in_one_table(tmp_path: Path) -> None:
+    """A chain of two links has other states than one of three."""
+    parts = [
+        hand_made(
+            tmp_path,
+            {"trials": pd.DataFrame({"trial": [0], f"joint_{links}": [0.5]})},
+            system={"target": "mlci.zoo.unicycle.Unicycle", "arguments": {"links": links}},
+        )
+        for links in (2, 3)
+    ]
+    collate(parts, tmp_path / "study")
+    header, *rows = lines(tmp_path / "study")
+    assert header.endswith("seed,trial,joint_2,joint_3")
+    assert [row.split(",")[-3:] for row in rows] == [["0", "0.5", ""], ["0", "", "0.5"]]
+
+
 def test_two_versions_of_one_of_two_systems_are_a_mixture(tmp_path: Path) -> None:
     wheel = {"target": "mlci.zoo.unicycle.Unicycle", "arguments": {}}
     points = [point_with(tmp_path), point_with(tmp_path, system=wheel)]
