@@ -29,13 +29,18 @@ def shown_truth(truth: Regions, demonstrations: Sequence[Demonstration], raster:
 
 
 def ideal_world(
-    evidence: ShapeEvidence, rng: np.random.Generator
+    evidence: ShapeEvidence, rng: np.random.Generator, together: Bools | None = None
 ) -> tuple[ShapeEvidence, Bools] | None:
     """Evidence for the same tasks in a world in which all that inference assumes is right.
 
     Two of the shapes are forbidden, as the prior would have it but that they lie in the way of as
     many of the tasks as they can, and each demonstration is drawn from the tabular model under
     them.
+
+    Args:
+        evidence: of the tasks.
+        rng: of the truth and the demonstrations.
+        together: (C, C) which pairs may be forbidden together; all by default.
 
     Returns:
         The evidence, and the truth (P,); None where the model cannot do a task.
@@ -46,7 +51,11 @@ def ideal_world(
         return None
     first = rng.integers(0, count, _PAIRS)
     pairs = np.stack([first, (first + rng.integers(1, count, _PAIRS)) % count], axis=1)
-    # (N, _PAIRS, S) whether a trajectory avoids both shapes of a pair.
+    if together is not None:
+        pairs = pairs[together[pairs[:, 0], pairs[:, 1]]]
+    if not len(pairs):
+        return None
+    # (N, at most _PAIRS, S) whether a trajectory avoids both shapes of a pair.
     keeps_out = np.array([np.all(each[:, pairs], axis=2).T for each in tasks])
     share = np.mean(keeps_out, axis=2)
     crossed = np.sum((share > 0) & (share < _IN_THE_WAY), axis=0)

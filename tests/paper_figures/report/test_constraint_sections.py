@@ -113,6 +113,8 @@ def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
     assert "and expects 0.50" in text
     assert "overlap all of it by 1.0 [0.95, 1.1]" in text
     assert "the same inference reaches 0.90 [0.85, 0.95]" in text
+    assert "4 chosen tasks reach 1.1 [1.1, 1.2], more than 0.80 [0.75, 0.85] of random" in text
+    assert "where all that is assumed is right, 1.2 [1.1, 1.2]" in text
     # Ceilings reach nothing: they know the truth.
     assert "best area of shapes reaches 0.6 with 1" in text
     assert "all of the truth that was shown reaches" not in text
