@@ -29,7 +29,11 @@ def shown_truth(truth: Regions, demonstrations: Sequence[Demonstration], raster:
 
 
 def ideal_world(
-    evidence: ShapeEvidence, rng: np.random.Generator, together: Bools | None = None
+    evidence: ShapeEvidence,
+    rng: np.random.Generator,
+    together: Bools | None = None,
+    *,
+    spare: bool = False,
 ) -> tuple[ShapeEvidence, Bools] | None:
     """Evidence for the same tasks in a world in which all that inference assumes is right.
 
@@ -41,6 +45,8 @@ def ideal_world(
         evidence: of the tasks.
         rng: of the truth and the demonstrations.
         together: (C, C) which pairs may be forbidden together; all by default.
+        spare: whether some tasks may be impossible in that world, as there are others; they tell
+            nothing. Else the truth leaves them all possible.
 
     Returns:
         The evidence, and the truth (P,); None where the model cannot do a task.
@@ -59,11 +65,17 @@ def ideal_world(
     keeps_out = np.array([np.all(each[:, pairs], axis=2).T for each in tasks])
     share = np.mean(keeps_out, axis=2)
     crossed = np.sum((share > 0) & (share < _IN_THE_WAY), axis=0)
-    crossed[np.any(share == 0, axis=0)] = -1  # the model could not show it
+    if not spare:
+        crossed[np.any(share == 0, axis=0)] = -1  # the model could not show it
     pair = int(np.argmax(crossed))
     if crossed[pair] < 0:
         return None
-    drawn = [int(rng.choice(np.flatnonzero(of_task[pair]))) for of_task in keeps_out]
-    violated = np.array([~each[s] for each, s in zip(tasks, drawn, strict=True)])
+    violated, avoided = np.zeros_like(evidence.violated), list[Bools | None](tasks)
+    for number, (each, of_task) in enumerate(zip(tasks, keeps_out, strict=True)):
+        shown = np.flatnonzero(of_task[pair])
+        if len(shown):
+            violated[number] = ~each[rng.choice(shown)]
+        else:
+            avoided[number] = None
     truth = np.any(evidence.inside[:, pairs[pair]], axis=1)
-    return replace(evidence, violated=violated), truth
+    return replace(evidence, violated=violated, avoided=tuple(avoided)), truth

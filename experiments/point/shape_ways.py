@@ -108,7 +108,7 @@ class ShapeWays:
         """
         rng = stream(self.settings.seed, Purpose.AREAS, 4)
         worlds = {"chosen": (self.evidence, self.truth)}
-        ideal = ideal_world(self.evidence, rng, self.together)
+        ideal = ideal_world(self.evidence, rng, self.together, spare=True)
         if ideal is not None:
             worlds["ideal_chosen"] = ideal
         for way, (evidence, truth) in worlds.items():

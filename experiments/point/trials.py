@@ -105,9 +105,10 @@ def demonstrations(settings: Settings, store: Store) -> TrialSet:
     omega, omega_key, margin, safety_filter = None, None, safety.margin, None
     if len(settings.constraint):  # where nothing is forbidden, everything is safe
         omega, omega_key = safe_set(settings, store)
-        margin = border_margin(system, omega, dt) if margin is None else margin
+        limited = settings.limited_model
+        margin = border_margin(limited, omega, dt) if margin is None else margin
         integrator = _skill(settings)["integrator"]
-        safety_filter = SafetyFilter(system, omega, dt, margin, safety.width, integrator)
+        safety_filter = SafetyFilter(limited, omega, dt, margin, safety.width, integrator)
 
     def compute() -> dict[str, np.ndarray]:
         trials = _trials(settings, omega, margin or 0.0)

@@ -151,6 +151,13 @@ def test_a_perfect_belief_finds_what_an_ideal_world_forbids() -> None:
     assert ideal_world(unable, np.random.default_rng(0)) is None
     walled = replace(evidence, avoided=(np.zeros((5, 2), dtype=bool),))
     assert ideal_world(walled, np.random.default_rng(0)) is None
+    both = replace(walled, avoided=(walled.avoided[0], avoided), violated=np.ones((2, 2), bool))
+    assert ideal_world(both, np.random.default_rng(0)) is None
+    spared = ideal_world(both, np.random.default_rng(0), spare=True)
+    assert spared is not None
+    assert spared[0].avoided[0] is None
+    assert spared[0].avoided[1] is avoided
+    assert not spared[0].violated.any()
 
 
 def test_overlaps_of_areas() -> None:
