@@ -52,6 +52,12 @@ def test_when_a_limit_is_found_and_how_often_one_is_imagined(tmp_path: Path) -> 
     assert "with no number that was tried" in weaker
     assert "| at most 1 | calibrated | 10 | 97 % [92, 100 %] | 50 % [45, 55 %] | 1 %" in text
     assert "| no limit | the model's | 1 | - | - | 50 % [45, 55 %] |" in text
+    # 0.1 k + 0.02 n for each column k: of nothing 2 % after one demonstration, and so on.
+    assert "| at most 1 | 10 | 20 % [19, 21 %] | 30 % [29, 31 %] | 40 % [39, 41 %] |" in text
+    assert "| no limit | 2 |" not in text  # of sizes 1, 3 and 10
+    del tables["joint_curve"]
+    alone = section_controls.section(results(tmp_path / "alone", "control_limits", tables))
+    assert "in one belief: the study `control_limits` has no table `joint_curve` yet" in alone
     limits = tables["cases"].query("truth != 'none'")
     some = results(tmp_path / "some", "control_limits", {**tables, "cases": limits})
     with pytest.raises(Missing, match="cannot be read: it compares truths"):
