@@ -10,12 +10,17 @@ import numpy as np
 from experiments.console import bounds, probability
 from experiments.terminal import counted, entry, table_lines
 from mlci.actuation.inference import ControlInference
+from mlci.actuation.joint import KINDS, JointInference
 from mlci.areas.belief import AreaBelief
 from mlci.misfit import listed
 from mlci.sets.posterior import SetPosterior
 
 _AREAS, _MARGINALS = 3, 5  # that are printed
 _FEW_SHAPES = 300  # below a fifth of the 1500 that studies draw
+JOINT_ASSUMED = (
+    "at most one region and one range are forbidden; chances as the tabular agent's, which are not "
+    "calibrated"
+)
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,7 @@ class Beliefs:
     names: Sequence[str] = ()  # of the hypotheses
     sets: SetPosterior | None = None
     controls: ControlInference | None = None
+    joint: JointInference | None = None
     area: AreaBelief | None = None
 
 
@@ -32,6 +38,7 @@ def belief_lines(beliefs: Beliefs, top: int) -> Iterator[str]:
     """What is believed beside the ranking, of all that was asked; `top` ranges of controls."""
     yield from set_lines(beliefs.sets, beliefs.names)
     yield from control_lines(beliefs.controls, top)
+    yield from joint_lines(beliefs.joint, top)
     yield from area_lines(beliefs.area)
 
 
@@ -115,6 +122,24 @@ def control_lines(controls: ControlInference | None, top: int) -> Iterator[str]:
     rows.append(["none", "0.000".rjust(10), none.rjust(9), ""])
     yield from (f"  {line}" for line in table_lines(rows))
     yield from entry("assumed", controls_assumed(controls))
+
+
+def joint_lines(joint: JointInference | None, top: int) -> Iterator[str]:
+    """The most probable pairs of a region and controls, and how probable each kind is."""
+    if joint is None:
+        return
+    kinds = ", ".join(
+        f"{kind} {probability(share)}"
+        for kind, share in zip(KINDS, joint.of_kinds.tolist(), strict=True)
+    )
+    yield from entry("both", f"a region and controls in one belief; forbidden are: {kinds}")
+    rows = [["region", "controls", "gain [nat]", "posterior"]]
+    rows += [
+        [row["region"], row["controls"], f"{row['gain']:.3f}", probability(row["posterior"])]
+        for row in joint.to_frame().head(top).to_dict("records")
+    ]
+    yield from (f"  {line}" for line in table_lines(rows))
+    yield from entry("assumed", JOINT_ASSUMED)
 
 
 def control_words(controls: ControlInference) -> str:

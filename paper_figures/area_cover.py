@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from paper_figures.plane import Plane
 from paper_figures.rows import Unsuited
-from paper_figures.style import CHANCE, EDGE, GUIDE, PAGE, RC, STEP_COLOURS, new_figure
+from paper_figures.style import CHANCE, EDGE, GUIDE, PAGE, RC, SIX_COLOURS, STEP_COLOURS, new_figure
 
 TABLES = {
     "area_curve": ("demonstrations", "method", "iou", "iou_low", "iou_high"),
@@ -30,16 +30,21 @@ METHODS = {
     "climb": "posterior of the set",
     "likeliest": "most probable shapes",
     "shapes": "best area of shapes",
-    "ideal": "the same, all assumptions right",
+    "chosen": "the same, chosen tasks",
+    "ideal": "random tasks, all assumptions right",
+    "ideal_chosen": "chosen tasks, all assumptions right",
     "shown": "all of the truth that was shown",
 }
+CEILINGS = ("ideal", "ideal_chosen", "shown")  # they know more than demonstrations tell
 # What is drawn; the others are in the report.
 _LOOKS = {
     "single": (STEP_COLOURS[0], "o", "-"),
     "greedy": (STEP_COLOURS[1], "s", "-"),
     "climb": (STEP_COLOURS[2], "^", "-"),
     "shapes": (STEP_COLOURS[3], "D", "-"),
+    "chosen": (SIX_COLOURS[2], "v", "-"),
     "ideal": (GUIDE, "", "--"),
+    "ideal_chosen": (GUIDE, "", "-."),
     "shown": (GUIDE, "", ":"),
 }
 
@@ -87,7 +92,7 @@ def draw(
             number = curve["demonstrations"]
             look = {"color": colour, "marker": mark, "linestyle": line}
             right.plot(number, curve["iou"], label=METHODS[name], **look)
-            if name in ("ideal", "shown"):  # ceilings, without bands
+            if name in CEILINGS:  # without bands
                 continue
             right.fill_between(
                 number, curve["iou_low"], curve["iou_high"], color=colour, alpha=0.15, linewidth=0

@@ -58,7 +58,8 @@ def draw(control_curve: pd.DataFrame, cases: pd.DataFrame) -> Figure:
             best = each[each["calibrated"] == each["calibrated"].max()]
             label = f"u {case} {UNIT}"
             for place, name in zip(axes, ("true_first", "posterior"), strict=False):
-                _curve(place, best, name, STEP_COLOURS[look], STEP_MARKS[look], "-", label)
+                line = "-" if number < len(STEP_COLOURS) else "--"
+                _curve(place, best, name, STEP_COLOURS[look], STEP_MARKS[look], line, label)
         free = pd.concat([each for case, each in rows.items() if case not in limited])
         for calibrated, each in free.groupby("calibrated"):
             kind = "calibrated" if calibrated else "model's chances"

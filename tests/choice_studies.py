@@ -272,7 +272,7 @@ def wrong_model_tables() -> dict[str, pd.DataFrame]:
 def area_cover_tables() -> dict[str, pd.DataFrame]:
     """Four squares, one method better than the next."""
     methods = ["single", "neighbourhood", "greedy", "climb", "likeliest", "shapes"]
-    methods, sizes = [*methods, "ideal", "shown"], [1, 2, 4]
+    methods, sizes = [*methods, "ideal", "shown", "chosen", "ideal_chosen"], [1, 2, 4]
     curve = [
         {"demonstrations": size, "method": name, "iou": iou, "iou_low": iou - 0.05}
         | {"iou_high": iou + 0.05}

@@ -52,7 +52,19 @@ def control_tables() -> dict[str, pd.DataFrame]:
     ]
     cases = pd.DataFrame({"truth": ["none", "weak", "weaker"]})
     cases["case"] = ["no limit", "at most 1", "at least -0.5"]
-    return {"control_curve": pd.DataFrame(rows), "cases": cases}
+    columns = ("of_nothing", "of_region", "of_controls", "of_both", "true_first")
+    joint = [
+        {"truth": truth, "demonstrations": size, "seeds": 2}
+        | {
+            f"{name}{end}": 0.1 * k + 0.02 * size + shift
+            for k, name in enumerate(columns)
+            for end, shift in (("", 0.0), ("_low", -0.01), ("_high", 0.01))
+        }
+        for truth in ("none", "weak")
+        for size in (1, 2, 10)
+    ]
+    tables = {"control_curve": pd.DataFrame(rows), "cases": cases}
+    return tables | {"joint_curve": pd.DataFrame(joint)}
 
 
 def resolution_tables() -> dict[str, pd.DataFrame]:

@@ -45,13 +45,15 @@ def study_tables(tables: Mapping[str, Path]) -> dict[str, pd.DataFrame]:
 
     Args:
         tables: the collated tables by name: `trials` makes `measures`, `ranks` makes `rank_curve`,
-            and `areas` and `control_ranks`, where they are, `area_curve` and `control_curve`.
+            and `areas`, `control_ranks` and `joint_ranks`, where they are, `area_curve`,
+            `control_curve` and `joint_curve`.
     """
     makers = {
         "measures": ("trials", measures),
         "rank_curve": ("ranks", rank_curve),
         "area_curve": ("areas", area_curve),
         "control_curve": ("control_ranks", control_curve),
+        "joint_curve": ("joint_ranks", joint_curve),
     }
     return {
         name: make(_read(tables[source]))
@@ -139,6 +141,20 @@ def control_curve(ranks: pd.DataFrame) -> pd.DataFrame:
         As of `area_curve`, with `calibrated` in place of `method`.
     """
     return _mean_curve(ranks, "calibrated", "first")
+
+
+def joint_curve(ranks: pd.DataFrame) -> pd.DataFrame:
+    """What is believed of regions and controls at once, by the number of demonstrations.
+
+    Args:
+        ranks: opening columns up to `seed`, `demonstrations`, `subset`, names of the most probable
+            pair, and columns whose means count; NaN is no value.
+
+    Returns:
+        As of `area_curve`, without `method`.
+    """
+    one = ranks.assign(first_region="")  # of one kind
+    return _mean_curve(one, "first_region", "first_controls").drop(columns="first_region")
 
 
 def _mean_curve(table: pd.DataFrame, kind: str, last: str) -> pd.DataFrame:

@@ -17,6 +17,11 @@ from mlci.systems import System
 def control_hypothesis_problems(settings: ModelSettings) -> Iterator[str]:
     """Ranges that do not match the controls, are there twice, or hold no action."""
     key, controls, system = "hypotheses.controls", settings.hypotheses.controls, settings.model
+    if controls.both and not controls.is_asked:
+        yield (
+            f"{key}.both: {controls.both}, but no range may be forbidden; give ranges or shares, "
+            "or set it to 0"
+        )
     faults = list(_range_problems(f"{key}.ranges", controls.ranges, system))
     yield from faults
     if faults:
@@ -48,11 +53,11 @@ def control_truth_problems(settings: Settings) -> Iterator[str]:
         except ValueError as error:
             ends = "; with demonstrations.clip=true the control range has ends"
             yield f"{key}: {error}{'' if settings.demonstrations.clip else ends}"
-    if truth.count or truth.cell is not None:
-        yield (
-            f"{key}: {len(truth.controls)} ranges and regions are given, but the safe set knows "
-            "of no forbidden controls; keep the ranges or the regions"
-        )
+    if not faults and (truth.count or truth.cell is not None):
+        try:
+            _ = settings.limited_model
+        except ValueError as error:
+            yield f"{key}: {error}"
 
 
 def _range_problems(key: str, listed: tuple[ControlRange, ...], system: System) -> Iterator[str]:

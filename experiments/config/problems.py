@@ -71,7 +71,7 @@ def checked(kind: type[T], tree: Mapping[str, Any]) -> T:
 
 
 @cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
+def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
     """What checks settings of a kind; it takes a tenth of a second to build."""
     return TypeAdapter(kind)
 

@@ -6,10 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.belief_lines import Beliefs, all_entered, area_concern, controls_assumed
+from experiments.belief_lines import (
+    JOINT_ASSUMED,
+    Beliefs,
+    all_entered,
+    area_concern,
+    controls_assumed,
+)
 from experiments.console import bounds
 from experiments.page.words import of_100
 from mlci.actuation.inference import ControlInference
+from mlci.actuation.joint import NOTHING, JointInference
 from mlci.areas.belief import AreaBelief
 from mlci.misfit import listed
 from mlci.sets.posterior import SetPosterior
@@ -22,6 +29,7 @@ def belief_sentences(beliefs: Beliefs) -> list[str]:
     return [
         *_set_sentences(beliefs.sets, beliefs.names),
         *_control_sentences(beliefs.controls),
+        *_joint_sentences(beliefs.joint),
         *_area_sentences(beliefs.area),
     ]
 
@@ -76,6 +84,27 @@ def _set_sentences(sets: SetPosterior | None, names: Sequence[str]) -> list[str]
         agree = "which agree" if sets.check.agrees else "which DISAGREE: do not rely on it"
         sentences.append(f"This is estimated from a sample by several chains, {agree}.")
     return sentences
+
+
+def _joint_sentences(joint: JointInference | None) -> list[str]:
+    """What is believed of a region and controls at once; nothing where that is not asked."""
+    if joint is None:
+        return []
+    nothing, region, controls, both = map(of_100, joint.of_kinds.tolist())
+    first, limit = joint.most_probable
+    answers = {
+        (True, True): "that neither a region nor controls are avoided",
+        (False, True): f"region {first} alone",
+        (True, False): f"that {limit} is not applied, and no region is avoided",
+        (False, False): f"region {first}, and that {limit} is not applied",
+    }
+    answer = answers[first == NOTHING, limit == NOTHING]
+    chance = of_100(float(joint.posterior.max()))
+    return [
+        f"If a region and controls may be avoided at once, the likeliest answer is {answer}: "
+        f"{chance}. Nothing: {nothing}; a region alone: {region}; controls alone: {controls}; "
+        f"both: {both}. That takes for granted: {JOINT_ASSUMED}."
+    ]
 
 
 def _control_sentences(controls: ControlInference | None) -> list[str]:

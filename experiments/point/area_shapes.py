@@ -11,7 +11,7 @@ import pandas as pd
 from experiments.config.settings import ModelSettings
 from mlci.areas.belief import AreaBelief, infer_area
 from mlci.areas.evidence import ShapeEvidence
-from mlci.areas.prior_shapes import draw_shapes
+from mlci.areas.prior_shapes import apart, draw_shapes
 from mlci.demonstrations import Demonstration
 from mlci.evidence import Rates
 from mlci.grids import Grid
@@ -41,15 +41,20 @@ def area_belief(
     """
     if not settings.inference.shapes.count:
         return None
-    return infer_area(
-        shape_evidence(settings, model, demonstrations, inference, rng), rng, sizes(settings)
-    )
+    evidence = shape_evidence(settings, model, demonstrations, inference, rng)
+    together = pairs_together(settings, evidence)
+    return infer_area(evidence, rng, sizes(settings), together=together)
 
 
 def sizes(settings: ModelSettings) -> tuple[float, float, float]:
     """Prior probabilities that nothing is forbidden, one shape, or two."""
     some, pair = 1 - settings.inference.prior, settings.inference.shapes.pair
     return 1 - some, some * (1 - pair), some * pair
+
+
+def pairs_together(settings: ModelSettings, evidence: ShapeEvidence) -> Bools | None:
+    """(C, C) which pairs of shapes may be forbidden together; None where all may."""
+    return apart(evidence.inside) if settings.inference.shapes.apart else None
 
 
 def shape_evidence(

@@ -75,6 +75,11 @@ def area_tables(settings: Settings, point: PointInference) -> dict[str, pd.DataF
             ]
             for name, share in shares.items():
                 columns[f"{name}_{size}"] += share / len(by_size[size])
+    if by_shapes is not None and by_size:
+        there = sorted(set(asked.demonstrations) & set(by_size))
+        for size, method, row in by_shapes.chosen(there):
+            opening = {"demonstrations": size, "subset": 0, "method": method}
+            rows.append({**opening, "expected": np.nan, **row})
     of_cells = {"hypothesis": np.arange(len(cells)), "in_truth": by_cells.in_truth}
     return {"areas": pd.DataFrame(rows), "area_map": pd.DataFrame({**of_cells, **columns})}
 

@@ -48,7 +48,7 @@ def point_controls(
 ) -> ControlInference | None:
     """What a point's demonstrations say of controls; None where nothing is asked of these."""
     forecasts = None
-    if _is_asked(settings) and settings.inference.calibrate:
+    if settings.hypotheses.controls.is_asked and settings.inference.calibrate:
         modules = _modules(settings)
         depends = (*forecast_inputs(settings), settings.hypotheses.controls)
 
@@ -76,7 +76,7 @@ def recorded_controls(
             it is used; else tasks like the recorded ones are simulated.
     """
     forecasts = None
-    if _is_asked(settings):
+    if settings.hypotheses.controls.is_asked:
         begin("ranking ranges of controls")
         if settings.inference.calibrate and exported is not None:
             more = settings.hypotheses.controls
@@ -104,7 +104,7 @@ def control_tables(
         probability that nothing is forbidden; whether the most probable answer is a range that is
         no part of the truth (`wrong`), and one above 0.5 (`wrong_sure`).
     """
-    is_truth, in_truth = _against_truth(settings)
+    is_truth, in_truth = against_truth(settings)
     known = is_truth.any()
     names = np.array(controls.hypotheses.names, dtype=object)
     rates = settings.inference.rates(calibrated=False)
@@ -137,7 +137,7 @@ def control_tables(
     return {"controls": frame, "control_ranks": pd.concat(rows, ignore_index=True)}
 
 
-def _against_truth(settings: Settings) -> tuple[Bools, Bools]:
+def against_truth(settings: Settings) -> tuple[Bools, Bools]:
     """(C,) which hypotheses are what is forbidden in truth, and which are a part of it."""
     system, truth = settings.model, ranges_of(settings.truth.controls, settings.model)
     hypotheses, box = settings.hypotheses.controls.hypotheses(system), system.control_box
@@ -172,12 +172,6 @@ def _modules(settings: ModelSettings) -> list[ModuleType]:
     return [mlci.actuation.inference, mlci.demonstrator, system_module(settings.model), here]
 
 
-def _is_asked(settings: ModelSettings) -> bool:
-    """Whether there are hypotheses about controls."""
-    controls = settings.hypotheses.controls
-    return bool(controls.ranges or controls.shares)
-
-
 def _fitted(
     settings: ModelSettings, model: TabularModel, unlimited: Sequence[Demonstration]
 ) -> ForecastMap | None:
@@ -200,7 +194,7 @@ def _inferred(
     forecasts: ForecastMap | None,
 ) -> ControlInference | None:
     """What demonstrations say of controls; None where nothing is asked of these."""
-    if not _is_asked(settings):
+    if not settings.hypotheses.controls.is_asked:
         return None
     controls, system = settings.hypotheses.controls, settings.model
     return infer_controls(

@@ -11,6 +11,7 @@ from experiments.config.settings import ESTIMATE, Settings
 from experiments.point.area_shapes import area_belief
 from experiments.point.controls import point_controls
 from experiments.point.forecasts import forecast_calibration
+from experiments.point.joint import joint_belief
 from experiments.point.no_answer import NoAnswer, why_none
 from experiments.point.ranking import ranked
 from experiments.point.sets import set_belief
@@ -118,9 +119,10 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
     sets = set_belief(
         settings, model, paths, inference, stream(settings.seed, Purpose.SETS, 0), hypotheses
     )
-    diagnosis = controls = area = None
+    diagnosis = controls = joint = area = None
     if isinstance(model, TabularModel):
         diagnosis, controls = diagnose(model), point_controls(settings, store, model, paths)
+        joint = joint_belief(settings, model, paths, inference, controls, hypotheses)
         of_areas = stream(settings.seed, Purpose.AREAS, 3)
         area = area_belief(settings, model, paths, inference, of_areas)
     return PointInference(
@@ -133,7 +135,7 @@ def infer_point(settings: Settings, store: Store) -> PointInference:
         inference=inference,
         diagnosis=diagnosis,
         calibration=calibration,
-        beliefs=Beliefs(inference.hypotheses.names, sets, controls, area),
+        beliefs=Beliefs(inference.hypotheses.names, sets, controls, joint, area),
     )
 
 

@@ -46,7 +46,7 @@ def keep_out(settings: Settings, store: Store, integrator: Integrator) -> KeepOu
     if safety.method == BARRIER:
         barrier = safety.barrier(settings.real_system.build(), settings.constraint, dt)
         return KeepOut(barrier, barrier.margin, barrier, mlci.safety.joint_barrier)
-    system = settings.real_model
+    system = settings.limited_model
     omega, key = safe_set(settings, store)
     margin = border_margin(system, omega, dt) if safety.margin is None else safety.margin
     kept_by = SafetyFilter(system, omega, dt, margin, safety.width, integrator)

@@ -4,22 +4,26 @@
 * `likeliest`: the most probable one or two shapes;
 * `shown`: the regions of the truth that lie in the way of some demonstration's task, a ceiling;
 * `ideal`: `shapes` where the truth is two of the shapes and the tabular model demonstrates, so that
-  all that inference assumes is right.
+  all that inference assumes is right;
+* `chosen`, `ideal_chosen`: `shapes` and `ideal` with tasks that are chosen one after the other, of
+  all that were demonstrated, by the overlap that is expected after each (`mlci.areas.next_task`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from experiments.config.settings import Settings
 from experiments.point.area_ceilings import ideal_world, shown_truth
-from experiments.point.area_shapes import shape_evidence, sizes
+from experiments.point.area_shapes import pairs_together, shape_evidence, sizes
 from experiments.point.inference import PointInference
 from experiments.point.streams import Purpose, stream
-from mlci.areas.belief import infer_area
+from mlci.areas.belief import AreaBelief, infer_area
 from mlci.areas.evidence import ShapeEvidence
+from mlci.areas.next_task import choose_tasks
 from mlci.spaces import Bools, Floats, Ints
 
 
@@ -31,6 +35,7 @@ class ShapeWays:
         settings: the point.
         point: its demonstrations.
         evidence: of all of them.
+        together: (C, C) which pairs of shapes may be forbidden together; None where all may.
         truth: (P,) which points of the raster are forbidden.
         cell: (P,) the hypothesis that holds each point, the first one; C where none does.
     """
@@ -38,6 +43,7 @@ class ShapeWays:
     settings: Settings
     point: PointInference
     evidence: ShapeEvidence
+    together: Bools | None
     truth: Bools
     cell: Ints
 
@@ -58,7 +64,7 @@ class ShapeWays:
         for i in reversed(range(len(cells))):
             cell[cells.shape(i).level(cells.space, points) < 0] = i
         truth = settings.constraint.signed_distance(points) < 0
-        return cls(settings, point, evidence, truth, cell)
+        return cls(settings, point, evidence, pairs_together(settings, evidence), truth, cell)
 
     def scores(
         self, subset: Ints, index: tuple[int, int]
@@ -73,35 +79,57 @@ class ShapeWays:
             A row a way; and the share (C,) of each hypothesis that is in the area of `shapes`.
         """
         rng = stream(self.settings.seed, Purpose.AREAS, 2, *index)
-        evidence, prior = self.evidence.of_some(subset), sizes(self.settings)
-        belief = infer_area(evidence, rng, prior)
+        evidence = self.evidence.of_some(subset)
+        belief = self._belief(evidence, rng)
         likeliest = np.any(evidence.inside[:, list(belief.shapes)], axis=1)
         seen = [self.point.demonstrations[j] for j in subset]
         shown = shown_truth(self.settings.constraint, seen, evidence.raster)
         rows = {
-            "shapes": {
-                **overlap_scores(belief.area, self.truth),
-                "regions": float(len(belief.parts)),
-                "expected": belief.overlap,
-            },
+            "shapes": _belief_scores(belief, self.truth),
             "likeliest": {
                 **overlap_scores(likeliest, self.truth),
                 "regions": float(len(belief.shapes)),
             },
             "shown": {**overlap_scores(shown, self.truth), "regions": np.nan},
         }
-        ideal = ideal_world(evidence, rng)
+        ideal = ideal_world(evidence, rng, self.together)
         if ideal is not None:
-            of_ideal = infer_area(ideal[0], rng, prior)
-            rows["ideal"] = {
-                **overlap_scores(of_ideal.area, ideal[1]),
-                "regions": float(len(of_ideal.parts)),
-                "expected": of_ideal.overlap,
-            }
+            rows["ideal"] = _belief_scores(self._belief(ideal[0], rng), ideal[1])
         count = len(self.point.inference.hypotheses)
         held = np.bincount(self.cell, minlength=count + 1)[:count]
         inside = np.bincount(self.cell, belief.area, minlength=count + 1)[:count]
         return rows, inside / np.maximum(held, 1)
+
+    def chosen(self, counts: Sequence[int]) -> Iterator[tuple[int, str, dict[str, float]]]:
+        """How the areas do of tasks that are chosen among all: number, way and scores.
+
+        Args:
+            counts: of demonstrations; those above the number of tasks are left out.
+        """
+        rng = stream(self.settings.seed, Purpose.AREAS, 4)
+        worlds = {"chosen": (self.evidence, self.truth)}
+        ideal = ideal_world(self.evidence, rng, self.together, spare=True)
+        if ideal is not None:
+            worlds["ideal_chosen"] = ideal
+        for way, (evidence, truth) in worlds.items():
+            prior = sizes(self.settings)
+            picked = choose_tasks(evidence, max(counts), rng, prior, together=self.together)
+            for count in (count for count in counts if count <= len(picked)):
+                belief = self._belief(evidence.of_some(picked[:count]), rng)
+                yield count, way, _belief_scores(belief, truth)
+
+    def _belief(self, evidence: ShapeEvidence, rng: np.random.Generator) -> AreaBelief:
+        """What some evidence says, with the prior of the settings."""
+        return infer_area(evidence, rng, sizes(self.settings), together=self.together)
+
+
+def _belief_scores(belief: AreaBelief, truth: Bools) -> dict[str, float]:
+    """How an area does, of how many parts it is, and what it expects."""
+    return {
+        **overlap_scores(belief.area, truth),
+        "regions": float(len(belief.parts)),
+        "expected": belief.overlap,
+    }
 
 
 def overlap_scores(area: Bools, truth: Bools) -> dict[str, float]:

@@ -43,6 +43,7 @@ def safe_set_inputs(settings: Settings) -> tuple[Any, ...]:
     method, horizon = settings.safety.method, settings.horizon
     return (
         settings.real_system,
+        settings.truth.controls,
         region_inputs(settings, settings.constraint),
         method,
         settings.safety.shape,
@@ -56,7 +57,7 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
     source = escapes if settings.safety.method == ESCAPES else mlci.safety.reachability
 
     def compute() -> dict[str, np.ndarray]:
-        system, truth = settings.real_model, settings.constraint
+        system, truth = settings.limited_model, settings.constraint
         if source is escapes:
             safe = tabulate_escapes(system, grid, truth, horizon=settings.horizon)
         else:

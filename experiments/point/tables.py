@@ -14,6 +14,7 @@ from experiments.point.controls import control_tables
 from experiments.point.evidence_kinds import evidence_table
 from experiments.point.forecasts import forecast_table
 from experiments.point.inference import PointInference
+from experiments.point.joint import joint_tables
 from experiments.point.measures import Measures
 from experiments.point.model_tables import model_tables
 from experiments.point.next_task_tables import next_task_table
@@ -107,6 +108,10 @@ def point_tables(
     if point.beliefs.controls is not None:
         rng = stream(settings.seed, Purpose.CONTROLS, 0)
         tables |= control_tables(settings, point.beliefs.controls, rng)
+    if point.beliefs.joint is not None:
+        inside = inference.hypotheses.inside(settings.constraint)
+        rng = stream(settings.seed, Purpose.CONTROLS, 1)
+        tables |= joint_tables(settings, point.beliefs.joint, inside, rng)
     if settings.soft.weights:
         tables["soft"] = soft_table(settings, point)
     if settings.resolution.counts:

@@ -17,6 +17,7 @@ from mlci.actuation.hypotheses import ControlHypotheses
 from mlci.cells.protocol import check_has_cells
 from mlci.demonstrations import Task
 from mlci.end_moves import MovePaths, allowed_moves, first_paths, last_paths, only_paths
+from mlci.joint_avoidance import log_avoidance_beside
 from mlci.maxent import TrajectoryDistribution
 from mlci.merged_moves import MergedMoves, joined, merge_moves
 from mlci.recursions import Leg, backward_pass
@@ -34,18 +35,28 @@ class ControlledMoves:
         model: the tabular model.
         hypotheses: the C hypotheses.
         moves: its moves, merged where successor and hypotheses are the same; these stand in the
-            place of regions.
+            place of regions, or follow them.
         shares: (C,) share of all moves that each hypothesis forbids.
+        with_regions: whether moves are also told apart by the model's regions, C' of them, whose
+            numbers come before those of the hypotheses.
     """
 
     model: TabularModel
     hypotheses: ControlHypotheses
     moves: MergedMoves
     shares: Floats
+    with_regions: bool = False
 
     @classmethod
-    def of(cls, model: TabularModel, hypotheses: ControlHypotheses) -> ControlledMoves:
+    def of(
+        cls, model: TabularModel, hypotheses: ControlHypotheses, *, with_regions: bool = False
+    ) -> ControlledMoves:
         """Look at every move of a model.
+
+        Args:
+            model: the tabular model.
+            hypotheses: the C hypotheses.
+            with_regions: also tell moves apart by the model's regions, for `joint_avoidance`.
 
         Raises:
             TypeError: a model without cells.
@@ -56,8 +67,8 @@ class ControlledMoves:
         hypotheses.check(model.system)
         count, parts = np.zeros(len(hypotheses)), []
         for cells in model.blocks():
-            block = _labelled(model, hypotheses, cells)
-            count += block.crosses.sum(axis=0).A1
+            block = _labelled(model, hypotheses, cells, with_regions)
+            count += block.crosses.sum(axis=0).A1[-len(hypotheses) :]
             parts.append(merge_moves([block]))
         moves, known = joined(parts), model.explored
         cells_known = model.states if known is None else int(np.sum(known.cells))
@@ -68,7 +79,7 @@ class ControlledMoves:
                 f"{hypotheses.names[i]} forbids none of the model's moves, of {len(model.actions)} "
                 "actions, so that the model cannot tell: take more actions, or a wider range"
             )
-        return cls(model, hypotheses, moves, count / (cells_known * model.moves))
+        return cls(model, hypotheses, moves, count / (cells_known * model.moves), with_regions)
 
     def avoidance(
         self, tasks: Sequence[Task], *, exact_ends: bool = True, round_horizon: bool = False
@@ -91,6 +102,45 @@ class ControlledMoves:
                 row[:] = backward_pass(legs, way.reachable, way.goal, way.start, len(row))[1]
         return alpha
 
+    def joint_avoidance(
+        self, tasks: Sequence[Task], *, exact_ends: bool = True, round_horizon: bool = False
+    ) -> Floats:
+        """alpha (N, C' + 1, C + 1): of no move that enters a region or that a hypothesis forbids.
+
+        The last of each axis is of no region, and of no hypothesis about controls. All are
+        probabilities under one distribution a task, that of the agent whom nothing keeps from
+        anything: a recursion for each hypothesis gives it with every region, see
+        `mlci.joint_avoidance`. 1 where a task cannot be done.
+
+        Args:
+            tasks: the N tasks.
+            exact_ends: as of `mlci.infer`.
+            round_horizon: likewise.
+
+        Raises:
+            ValueError: moves that are not told apart by regions.
+        """
+        if not self.with_regions:
+            raise ValueError("moves must be told apart by regions: with_regions=True")
+        regions, controls = len(self.model.regions), len(self.hypotheses)
+        alpha = np.ones((len(tasks), regions + 1, controls + 1))
+        for of_task, task in zip(alpha, tasks, strict=True):
+            way = TrajectoryDistribution.of_task(
+                self.model, task, round_horizon=round_horizon, exact_ends=exact_ends
+            )
+            if not way.is_possible:
+                continue
+            legs, log_z = self._legs(way), float(way.log_z[0, way.start])
+            for j in range(controls + 1):
+                others = np.arange(regions + controls) == regions + j
+                beside = log_avoidance_beside(
+                    legs, way.reachable, way.goal, way.start, log_z, others
+                )
+                of_task[:-1, j] = np.exp(beside[:regions])
+                if j < controls:
+                    of_task[-1, j] = np.exp(beside[regions + j])
+        return np.minimum(alpha, 1.0)
+
     def _legs(self, way: TrajectoryDistribution) -> list[Leg]:
         """The moves of each part of the way of a task."""
         ends, last = way.ends, way.steps - 1
@@ -107,9 +157,13 @@ class ControlledMoves:
     def _to_states(self, parts: Sequence[MovePaths]) -> MergedMoves:
         """Moves from or to states; none is merged with another."""
         held = np.concatenate([self._of_paths(action, path) for _, action, _, path in parts])
+        moves = allowed_moves(self.model, parts)
+        if self.with_regions:
+            count = len(self.model.regions)
+            held = np.hstack([moves.crosses(np.arange(len(held)), count), held])
         crosses = scipy.sparse.csr_matrix(held)
         return replace(
-            allowed_moves(self.model, parts),
+            moves,
             crossing_begins=crosses.indptr.astype(np.int64),
             crossing_region=crosses.indices.astype(np.int32),
         )
@@ -120,8 +174,11 @@ class ControlledMoves:
         return self.hypotheses.holds(middles, self.model.actions[action])
 
 
-def _labelled(model: TabularModel, hypotheses: ControlHypotheses, cells: Ints) -> SingleMoves:
-    """The moves of some cells, with the hypotheses that forbid them in the place of regions."""
+def _labelled(
+    model: TabularModel, hypotheses: ControlHypotheses, cells: Ints, with_regions: bool
+) -> SingleMoves:
+    """The moves of some cells, with the hypotheses that forbid them in the place of regions, or
+    after these."""
     single = model.moves_of(cells)
     origins = model.move_origins(
         np.repeat(cells, model.moves), np.tile(np.arange(model.moves), len(cells))
@@ -132,7 +189,10 @@ def _labelled(model: TabularModel, hypotheses: ControlHypotheses, cells: Ints) -
         origins = model.system.space.wrap(_middle(path))
     held = hypotheses.holds(origins, controls)
     successor = np.where(single.allowed(model.truth), single.successor, -1)
-    return SingleMoves(successor, single.reward, scipy.sparse.csr_matrix(held))
+    crosses = scipy.sparse.csr_matrix(held)
+    if with_regions:
+        crosses = scipy.sparse.hstack([single.crosses, crosses], format="csr")
+    return SingleMoves(successor, single.reward, crosses)
 
 
 def _middle(path: Floats) -> Floats:

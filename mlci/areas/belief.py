@@ -19,7 +19,7 @@ from mlci.areas.overlap import best_area
 from mlci.credible_sets import Area, joined_areas
 from mlci.grids import Grid
 from mlci.regions import Regions
-from mlci.spaces import Bools, Floats
+from mlci.spaces import Bools, Floats, Ints
 
 DRAWS = 500  # of the posterior, from which the area is told
 SIZES = (0.5, 0.1, 0.4)  # prior of nothing, one shape, two
@@ -65,11 +65,62 @@ class AreaBelief:
         return tuple(sorted(parts, key=lambda part: -len(part.regions)))
 
 
+@dataclass(frozen=True, eq=False)
+class SetsOfShapes:
+    """The posterior of W sets of one or two shapes, exact for the drawn shapes.
+
+    Attributes:
+        members: (W, 2) numbers of the shapes of each set, the same twice where it is one shape.
+        probability: (W,) of each, if anything is forbidden; empty where every shape is excluded.
+        some: probability that anything is forbidden.
+    """
+
+    members: Ints
+    probability: Floats
+    some: float
+
+    def draw(self, draws: int, rng: np.random.Generator) -> tuple[Ints, Floats]:
+        """Which sets are drawn (B,), each once, and their shares (B,) of the draws."""
+        drawn = rng.choice(len(self.members), draws, p=self.probability / self.probability.sum())
+        met, times = np.unique(drawn, return_counts=True)
+        return met, times / draws
+
+
+def sets_of_shapes(
+    evidence: ShapeEvidence,
+    sizes: tuple[float, float, float] = SIZES,
+    together: Bools | None = None,
+) -> SetsOfShapes:
+    """The posterior of some demonstrations; arguments as of `infer_area`."""
+    if len(sizes) != 3 or min(sizes) < 0 or not np.isclose(sum(sizes), 1):
+        raise ValueError(f"probabilities of nothing, one shape and two add up to 1, not {sizes}")
+    count, feasible = evidence.inside.shape[1], evidence.feasible
+    if together is not None and together.shape != (count, count):
+        raise ValueError(f"pairs of {count} shapes do not fit a mask of shape {together.shape}")
+    first, second = np.triu_indices(len(feasible))
+    one, pairs = first == second, comb(count, 2)
+    may = np.ones(len(first), dtype=bool)
+    if together is not None:
+        may = one | together[feasible[first], feasible[second]]
+        pairs = int(np.sum(np.triu(together, 1)))
+    with np.errstate(divide="ignore"):
+        prior = np.log(sizes) - np.log([1, count, max(pairs, 1)])
+    of_size = np.where(one, prior[1], prior[2])
+    weight = np.where(may, evidence.pair_gains(feasible)[first, second] + of_size, -np.inf)
+    total = scipy.special.logsumexp(np.append(weight, prior[0]))
+    some = scipy.special.logsumexp(weight) if len(weight) else -np.inf
+    if some == -np.inf:  # every shape is excluded
+        return SetsOfShapes(np.zeros((0, 2), dtype=np.int64), np.zeros(0), 0.0)
+    members = feasible[np.stack([first, second], axis=1)]
+    return SetsOfShapes(members, np.exp(weight - some), float(np.exp(some - total)))
+
+
 def infer_area(
     evidence: ShapeEvidence,
     rng: np.random.Generator,
     sizes: tuple[float, float, float] = SIZES,
     draws: int = DRAWS,
+    together: Bools | None = None,
 ) -> AreaBelief:
     """The belief of some demonstrations.
 
@@ -78,43 +129,32 @@ def infer_area(
         rng: of the draws.
         sizes: prior probabilities that nothing is forbidden, one shape, or two.
         draws: sets that are drawn from the posterior, to tell chances and the area.
+        together: (C, C) which pairs may be forbidden together, such as
+            `mlci.areas.prior_shapes.apart`; all by default.
 
     Raises:
-        ValueError: probabilities that do not add up to 1, or no draws.
+        ValueError: probabilities that do not add up to 1, no draws, or a mask of another shape.
     """
-    if len(sizes) != 3 or min(sizes) < 0 or not np.isclose(sum(sizes), 1):
-        raise ValueError(f"probabilities of nothing, one shape and two add up to 1, not {sizes}")
     if draws < 1:
         raise ValueError(f"an area is told from at least one draw, not {draws}")
-    count, feasible = evidence.inside.shape[1], evidence.feasible
-    first, second = np.triu_indices(len(feasible))
-    one = first == second
-    with np.errstate(divide="ignore"):
-        prior = np.log(sizes) - np.log([1, count, max(comb(count, 2), 1)])
-    weight = evidence.pair_gains(feasible)[first, second] + np.where(one, prior[1], prior[2])
-    total = scipy.special.logsumexp(np.append(weight, prior[0]))
-    some = scipy.special.logsumexp(weight) if len(weight) else -np.inf
-    raster, inside = evidence.raster, evidence.inside
-    if some == -np.inf:  # every shape is excluded
+    sets, raster = sets_of_shapes(evidence, sizes, together), evidence.raster
+    drawn = evidence.inside.shape[1]
+    if not len(sets.members):
         nowhere = np.zeros(raster.size)
-        none = np.array([1.0, 0, 0]), nowhere, nowhere > 0, np.nan, (), np.nan, count
+        none = np.array([1.0, 0, 0]), nowhere, nowhere > 0, np.nan, (), np.nan, drawn
         return AreaBelief(raster, *none)
-    probability = np.exp(weight - some)  # if anything is forbidden
-    of_some, of_one = np.exp(some - total), float(np.sum(probability[one]))
-
-    drawn = rng.choice(len(weight), draws, p=probability / np.sum(probability))
-    met, times = np.unique(drawn, return_counts=True)
-    masks = (inside[:, feasible[first[met]]] | inside[:, feasible[second[met]]]).T
-    share = times / draws
+    met, share = sets.draw(draws, rng)
+    masks = evidence.of_sets(sets.members[met])
     area, overlap = best_area(masks, share)
-    best = int(np.argmax(weight))
+    best = int(np.argmax(sets.probability))
+    of_one = float(np.sum(sets.probability[sets.members[:, 0] == sets.members[:, 1]]))
     return AreaBelief(
         raster=raster,
-        sizes=np.array([1 - of_some, of_some * of_one, of_some * (1 - of_one)]),
-        chance=of_some * (share @ masks),
+        sizes=np.array([1 - sets.some, sets.some * of_one, sets.some * (1 - of_one)]),
+        chance=sets.some * (share @ masks),
         area=area,
         overlap=overlap,
-        shapes=tuple(sorted({int(feasible[first[best]]), int(feasible[second[best]])})),
-        probability=float(of_some * probability[best]),
-        drawn=count,
+        shapes=tuple(sorted(set(sets.members[best].tolist()))),
+        probability=float(sets.some * sets.probability[best]),
+        drawn=drawn,
     )

@@ -113,6 +113,10 @@ class ShapeEvidence:
             excluded |= np.any(self.violated, axis=0)
         return np.flatnonzero(~excluded)
 
+    def of_sets(self, members: Ints) -> Bools:
+        """(B, P) which points of the raster lie in sets (B, 2) of shapes, by their numbers."""
+        return np.asarray((self.inside[:, members[:, 0]] | self.inside[:, members[:, 1]]).T)
+
     def pair_gains(self, shapes: Ints) -> Floats:
         """(B, B) gain [nat] of pairs of some shapes (B,), of each alone in the diagonal."""
         gain = np.zeros((len(shapes), len(shapes)))

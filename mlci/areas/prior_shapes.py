@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from mlci.regions import Regions
 from mlci.shapes.balls import Ball
-from mlci.spaces import Box, StateSpace
+from mlci.spaces import Bools, Box, StateSpace
 
 
 def draw_shapes(
@@ -53,3 +53,13 @@ def draw_shapes(
         each = zip(centers, halves, strict=True)
         return Regions.from_shapes(space, [Box(at - half, at + half) for at, half in each])
     return Regions.from_shapes(space, map(Ball, centers, halves))
+
+
+def apart(inside: Bools) -> Bools:
+    """(C, C) which pairs of shapes share no point.
+
+    Args:
+        inside: (P, C) which points lie in each shape, such as `ShapeEvidence.inside`.
+    """
+    points = inside.astype(np.float32)
+    return np.asarray(points.T @ points == 0)

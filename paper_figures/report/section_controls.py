@@ -13,6 +13,13 @@ STUDY = "control_limits"
 ENOUGH = 0.9  # of the sets
 _CHANCES = (" with the model's", "; with calibrated")
 _SIZES = (1, 3, 10)  # of the table
+_JOINT = {
+    "of_nothing": "nothing",
+    "of_region": "region alone",
+    "of_controls": "range alone",
+    "of_both": "both",
+    "true_first": "truth first",
+}
 
 
 def section(results: Results) -> str:
@@ -53,6 +60,30 @@ def section(results: Results) -> str:
         + "".join(_verdict(case, rows) for case, rows in of_cases.items())
         + "\n"
         + table(head, lines, words=2)
+        + _joint(results, cases)
+    )
+
+
+def _joint(results: Results, cases: pd.DataFrame) -> str:
+    """Whether it is told that a region, a range or both are forbidden; nothing where nobody asks."""
+    columns = [f"{name}{end}" for name in _JOINT for end in ("", "_low", "_high")]
+    try:
+        curve = results.table(STUDY, "joint_curve", ("truth", "demonstrations", *columns))
+    except Missing as missing:
+        return f"\nRegions and controls in one belief: {missing}.\n"
+    lines = [
+        [case, row["demonstrations"], *(_share(row, name) for name in _JOINT)]
+        for truth, case in zip(cases["truth"], cases["case"], strict=True)
+        for row in curve[curve["truth"] == truth].sort_values("demonstrations").to_dict("records")
+        if row["demonstrations"] in _SIZES
+    ]
+    return (
+        "\nRegions and ranges may also compete in *one* belief, as nothing, a region alone, a range "
+        "alone, or both: moves into the region and moves that apply the range are then left out of "
+        "one distribution a task. Columns are mean posterior probabilities, and the share of sets "
+        "in which the most probable answer is all of the truth; a region inside of the true one "
+        "counts. The model's chances are not calibrated for pairs.\n\n"
+        + table(["u, in " + UNIT, "demonstrations", *_JOINT.values()], lines, words=2)
     )
 
 

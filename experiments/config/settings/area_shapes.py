@@ -39,6 +39,7 @@ class AreaShapeSettings:
     pair: Annotated[
         Probability, about("prior probability that two shapes are forbidden, if any are")
     ]
+    apart: Annotated[bool, about("whether two shapes that are forbidden share no point")]
     samples: Annotated[
         Count, about("trajectories drawn for each task, to tell how many avoid two shapes")
     ]

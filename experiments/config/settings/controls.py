@@ -62,6 +62,20 @@ class ControlHypothesesSettings:
         ),
     ]
 
+    both: Annotated[
+        Share,
+        about(
+            "prior probability that a region and a range are forbidden at once, if anything is; "
+            "above 0 regions and ranges compete in one belief, and what is left goes to a region "
+            "alone and a range alone in equal parts"
+        ),
+    ]
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether there are hypotheses about controls."""
+        return bool(self.ranges or self.shares)
+
     def hypotheses(self, system: System) -> ControlRanges:
         """The hypotheses: the ranges, then those of shares.
 

@@ -42,6 +42,7 @@ from experiments.config.settings.safety import SafetySettings
 from experiments.config.settings.sampling import ModelsSettings, SampledSettings
 from experiments.config.settings.shapes import ShapeList
 from experiments.config.settings.system import SystemSettings, read_system
+from mlci.actuation.limited import Limited
 from mlci.control.effort import WithEffort
 from mlci.grids import Grid
 from mlci.regions import Regions
@@ -211,6 +212,16 @@ class Settings(ModelSettings):
         """What demonstrators move and what they maximise; `model` is what inference assumes."""
         system, effort = self.real_system.build(), self.reality.effort
         return system if effort is None else WithEffort(system, np.array(effort))
+
+    @cached_property
+    def limited_model(self) -> System:
+        """The same under the limit of those who keep to the truth, whose safe set it has.
+
+        Raises:
+            ValueError: forbidden ranges that leave no box, or nothing of the control range.
+        """
+        limit = self.control_limit if self.truth.controls else None
+        return self.real_model if limit is None else Limited(self.real_model, limit)
 
     @property
     def columns(self) -> dict[str, str | int | float]:

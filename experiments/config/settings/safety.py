@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic.dataclasses import dataclass
 
+from experiments.config.settings.cells import Shape
 from experiments.config.settings.kinds import STRICT, NotNegative, Positive, about
-from experiments.config.settings.parts import Shape
 from mlci.mechanics.planar_chain import PlanarChain
 from mlci.regions import Regions
 from mlci.safety.joint_barrier import JointBarrier

@@ -89,7 +89,6 @@ def test_regions_limit_no_control() -> None:
         ("truth.controls=[{lower: [1.0]}]", "truth.controls[0].upper: missing"),
         ("truth.controls=[{lower: [1.0], upper: [high]}]", "'high' is not a finite number"),
         ("truth.controls=[]", "give at least one box, with lower and upper, or another region, a"),
-        ("truth.cell=3", "truth.controls: 1 ranges and regions are given, but the safe set knows"),
         ("tasks.crossing=true", "tasks.crossing: true, but no truth is there to cross"),
         ("soft.weights=[1.0]", "soft.weights: [1.0], but no truth is there to ask about"),
         ("calibration.sets=3", "the prior knows no such truth"),

@@ -104,10 +104,12 @@ SHAPES = ["inference.shapes.count=60", "inference.shapes.samples=40"]
 
 def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
     """Slices of x: shapes are free in velocity, as hypotheses are, and so is the wall."""
-    words = ["areas.subsets=1", "areas.demonstrations=[3]", "hypotheses.shape=[10,null]", *SHAPES]
+    words = ["areas.subsets=1", "areas.demonstrations=[1,3]", "inference.shapes.apart=true"]
+    words += ["hypotheses.shape=[10,null]", *SHAPES]
     settings, lines = read_config(composed(*TINY, *words))[0], []
     tables = run_point(settings, Store(tmp_path), lines.append)
-    rows = tables["areas"].set_index("method")
+    assert "chosen" in set(tables["areas"].query("demonstrations == 1")["method"])
+    rows = tables["areas"].query("demonstrations == 3").set_index("method")
     assert {"shapes", "likeliest", "shown"} <= set(rows.index)
     # On 2304 points in x alone the wall is a tenth; what is shown of it is all or nothing.
     assert rows.loc["shown", "iou"] in (0.0, 1.0)
@@ -165,6 +167,13 @@ def test_a_perfect_belief_finds_what_an_ideal_world_forbids() -> None:
     assert ideal_world(unable, np.random.default_rng(0)) is None
     walled = replace(evidence, avoided=(np.zeros((5, 2), dtype=bool),))
     assert ideal_world(walled, np.random.default_rng(0)) is None
+    both = replace(walled, avoided=(walled.avoided[0], avoided), violated=np.ones((2, 2), bool))
+    assert ideal_world(both, np.random.default_rng(0)) is None
+    spared = ideal_world(both, np.random.default_rng(0), spare=True)
+    assert spared is not None
+    assert spared[0].avoided[0] is None
+    assert spared[0].avoided[1] is avoided
+    assert not spared[0].violated.any()
 
 
 def test_overlaps_of_areas() -> None:

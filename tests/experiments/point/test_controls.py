@@ -10,11 +10,13 @@ import pandas as pd
 import pytest
 from tiny_point import TINY, composed, computed
 
-from experiments.collate.intervals import control_curve
+from experiments.collate.intervals import control_curve, joint_curve
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
 from experiments.point import controls, trials
 from experiments.point.inference import infer_point
+from experiments.point.joint import true_pairs
+from experiments.point.stages import safe_set
 from experiments.tracking.store import Store
 from experiments.tracking.trees import canonical_json
 from mlci.evidence import Rates
@@ -43,6 +45,57 @@ def test_demonstrators_keep_to_the_limit_and_rule_breakers_do_not(tmp_path: Path
     assert 0 < breaks.sum() < len(breaks)
     np.testing.assert_array_equal(broken.controls[breaks], free.controls[breaks])
     np.testing.assert_array_equal(broken.controls[~breaks], limited.controls[~breaks])
+
+
+def test_who_is_limited_and_keeps_out_of_a_region_does_both(tmp_path: Path) -> None:
+    """The wall from 0.6 m to 1.2 m, and no push above 0.4 m/s^2. Who comes from the right, 0.8 m
+    before it and at 1 m/s, brakes by a push: 0.5 m with 1 m/s^2, and 1.25 m with the limit."""
+    both = settings_of("truth=wall", "truth.name=both", WEAK[2])
+    weak = trials.demonstrations(both, Store(tmp_path))
+    wall = trials.demonstrations(settings_of("truth=wall"), Store(tmp_path))
+    kept = weak.kept(12)
+    assert len(kept)
+    assert np.max(weak.controls[kept]) <= 0.4 + 1e-9
+    assert np.max(wall.controls) > 0.6
+    entered = both.constraint.violated_by(weak.states[kept].reshape(-1, 2)[:, None])
+    assert not entered.any()
+    (limited, one), (free, other) = (
+        safe_set(each, Store(tmp_path)) for each in (both, settings_of("truth=wall"))
+    )
+    assert one != other
+    coming = np.array([[2.0, -1.0], [-0.2, 1.0]])  # from the right, and from the left
+    assert (free.value(coming) > 0).tolist() == [True, True]
+    assert (limited.value(coming) > 0).tolist() == [False, True]
+
+
+def test_pairs_of_a_point(tmp_path: Path) -> None:
+    words = ("truth=wall", "truth.name=both", WEAK[2], "hypotheses.controls.both=0.3")
+    point = computed(settings_of(*words), tmp_path)
+    pairs = pd.read_csv(point.folder / "joint.csv")
+    assert len(pairs) == 11 * 5  # ten slices and none, four ranges and none
+    assert pairs["posterior"].sum() == pytest.approx(1)
+    truth = pairs[pairs["is_truth"]]
+    assert truth["controls"].tolist() == ["control 0 above 0.4"]
+    assert truth["region"].tolist() == ["6"]
+    ranks = pd.read_csv(point.folder / "joint_ranks.csv")
+    kinds = ranks[["of_nothing", "of_region", "of_controls", "of_both"]]
+    np.testing.assert_allclose(kinds.sum(axis=1), 1)
+    first = (ranks["first_region"] == "6") & (ranks["first_controls"] == "control 0 above 0.4")
+    np.testing.assert_array_equal(ranks["true_first"], first)
+    curve = joint_curve(ranks.astype({"truth": str}))
+    assert curve["posterior"].iloc[-1] == pytest.approx(
+        ranks.loc[ranks["demonstrations"] == 2, "posterior"].mean()
+    )
+    log = " ".join((point.folder / "log.txt").read_text().split())
+    assert "a region and controls in one belief; forbidden are: nothing" in log
+
+
+def test_true_pairs_where_one_thing_or_nothing_is_forbidden() -> None:
+    regions = np.arange(10) == 6
+    free, limited = settings_of("truth=none"), settings_of(*WEAK)
+    wall = settings_of("truth=wall")
+    for settings, expected in ((free, (10, 4)), (limited, (10, 0)), (wall, (6, 4))):
+        assert np.argwhere(true_pairs(settings, regions)).tolist() == [list(expected)]
 
 
 def test_truth_of_controls_counts_for_demonstrations_alone() -> None:

@@ -7,10 +7,10 @@ import itertools
 import numpy as np
 import pytest
 
-from mlci.areas.belief import AreaBelief, infer_area
+from mlci.areas.belief import AreaBelief, infer_area, sets_of_shapes
 from mlci.areas.evidence import ShapeEvidence, points_met, sample_paths
 from mlci.areas.overlap import best_area, expected_overlap
-from mlci.areas.prior_shapes import draw_shapes
+from mlci.areas.prior_shapes import apart, draw_shapes
 from mlci.demonstrations import Demonstration, Task
 from mlci.evidence import Rates
 from mlci.grids import Grid
@@ -157,6 +157,27 @@ def test_the_posterior_is_that_of_all_sets_one_by_one(rates: Rates) -> None:
     for members, weight in weights.items():
         chance += weight / total * np.any(evidence.inside[:, list(members)], axis=1)
     np.testing.assert_allclose(belief.chance, chance, atol=2.5 / np.sqrt(draws))
+
+
+def test_shapes_that_meet_are_not_forbidden_together() -> None:
+    """Four shapes are left, of which the pairs that share a point are out, and so rarer in all."""
+    evidence, sizes = by_hand(Rates(0.05)), (0.2, 0.3, 0.5)
+    evidence.inside[:] = False
+    for shape, points in enumerate([(0, 1, 2), (2, 3), (4, 5), (5, 6, 0), (8,)]):
+        evidence.inside[list(points), shape] = True
+    together = apart(evidence.inside)
+    allowed = [(0, 2), (0, 4), (1, 2), (1, 3), (1, 4), (2, 4), (3, 4)]
+    assert [pair for pair in itertools.combinations(range(5), 2) if together[pair]] == allowed
+    gain = evidence.pair_gains(np.arange(5))
+    weights = {(i, i): 0.3 / 5 * np.exp(gain[i, i]) for i in range(5)}
+    weights |= {pair: 0.5 / 7 * np.exp(gain[pair]) for pair in allowed}
+    total = sum(weights.values())
+    sets = sets_of_shapes(evidence, sizes, together)
+    assert sets.some == pytest.approx(total / (total + 0.2))
+    for members, probability in zip(sets.members.tolist(), sets.probability, strict=True):
+        assert probability == pytest.approx(weights.get(tuple(members), 0.0) / total)
+    with pytest.raises(ValueError, match=r"pairs of 5 shapes do not fit a mask of shape \(2, 2\)"):
+        infer_area(evidence, np.random.default_rng(0), sizes, together=together[:2, :2])
 
 
 def test_no_area_where_every_shape_is_excluded() -> None:

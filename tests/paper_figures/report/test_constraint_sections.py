@@ -52,6 +52,12 @@ def test_when_a_limit_is_found_and_how_often_one_is_imagined(tmp_path: Path) -> 
     assert "with no number that was tried" in weaker
     assert "| at most 1 | calibrated | 10 | 97 % [92, 100 %] | 50 % [45, 55 %] | 1 %" in text
     assert "| no limit | the model's | 1 | - | - | 50 % [45, 55 %] |" in text
+    # 0.1 k + 0.02 n for each column k: of nothing 2 % after one demonstration, and so on.
+    assert "| at most 1 | 10 | 20 % [19, 21 %] | 30 % [29, 31 %] | 40 % [39, 41 %] |" in text
+    assert "| no limit | 2 |" not in text  # of sizes 1, 3 and 10
+    del tables["joint_curve"]
+    alone = section_controls.section(results(tmp_path / "alone", "control_limits", tables))
+    assert "in one belief: the study `control_limits` has no table `joint_curve` yet" in alone
     limits = tables["cases"].query("truth != 'none'")
     some = results(tmp_path / "some", "control_limits", {**tables, "cases": limits})
     with pytest.raises(Missing, match="cannot be read: it compares truths"):
@@ -113,6 +119,8 @@ def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
     assert "and expects 0.50" in text
     assert "overlap all of it by 1.0 [0.95, 1.1]" in text
     assert "the same inference reaches 0.90 [0.85, 0.95]" in text
+    assert "4 chosen tasks reach 1.1 [1.1, 1.2], more than 0.80 [0.75, 0.85] of random" in text
+    assert "where all that is assumed is right, 1.2 [1.1, 1.2]" in text
     # Ceilings reach nothing: they know the truth.
     assert "best area of shapes reaches 0.6 with 1" in text
     assert "all of the truth that was shown reaches" not in text
