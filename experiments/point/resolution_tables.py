@@ -17,7 +17,7 @@ from mlci.cells.refinement import refine
 from mlci.demonstrations import Task
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 from mlci.spaces import Floats
 from mlci.tabular import TabularModel
 

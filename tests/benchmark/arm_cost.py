@@ -21,8 +21,8 @@ import pandas as pd
 from mlci.demonstrations import Task
 from mlci.mechanics.planar_chain import PlanarChain
 from mlci.regions import Regions
-from mlci.sampled.distribution import SampledModel
 from mlci.sampled.local_policies import riccati_policies
+from mlci.sampled.model import SampledModel
 from mlci.sampled.modes import find_modes
 from mlci.sampled.proposals import Proposal, draw
 from mlci.spaces import Box

@@ -37,7 +37,7 @@ from mlci.preparation import infer, prepare
 from mlci.rank_errors import rank_errors
 from mlci.regions import Regions
 from mlci.safety.joint_barrier import JointBarrier
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 from mlci.simulate import RK4
 from mlci.spaces import Bools, Box
 
