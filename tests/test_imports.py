@@ -140,7 +140,7 @@ MLCI = {
     "mlci.sampled.proposals": "mlci.sampled.local_policies",
     "mlci.sampled.adaptation": "mlci.sampled.proposals mlci.sampled.weights",
     "mlci.sampled.diagnosis": "mlci.spaces",
-    "mlci.sampled.model_check": "mlci.spaces",
+    "mlci.sampled.model_check": "mlci.systems",
     "mlci.sampled.distribution": "mlci.sampled.adaptation mlci.sampled.diagnosis",
     "mlci.sampled.model": "mlci.sampled.distribution mlci.sampled.model_check",
     "mlci.sampled.rare_regions": "mlci.sampled.distribution",

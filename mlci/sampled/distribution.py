@@ -84,7 +84,8 @@ class SampledDistribution:
             ValueError: no path reaches the goal.
         """
         self._require_possible()
-        return np.clip(self.weight @ self.avoided, 0.0, 1.0)
+        alpha = np.clip(self.weight @ self.avoided, 0.0, 1.0)
+        return np.where(np.all(self.avoided, axis=0), 1.0, alpha)  # else rounding moves it
 
     def violation_probabilities(self) -> Floats:
         """Phi_i = 1 - alpha_i (C,)."""
