@@ -53,7 +53,9 @@ from mlci.regions import Regions
 from mlci.safety.joint_barrier import JointBarrier
 from mlci.safety.reachability import SafeSet, solve_safe_set
 from mlci.safety.safety_filter import SafetyFilter
-from mlci.sampled.distribution import SampledDistribution, SampledModel
+from mlci.sampled.distribution import SampledDistribution
+from mlci.sampled.model import SampledModel
+from mlci.sampled.rare_regions import RareViolations, rare_violations
 from mlci.sets.evidence import SetEvidence
 from mlci.sets.inference import infer_sets
 from mlci.sets.posterior import SetPosterior, SetPrior, enumerate_sets
@@ -114,6 +116,7 @@ __all__ = [
     "Predicate",
     "PreparedInference",
     "RankErrors",
+    "RareViolations",
     "RefinedModel",
     "Regions",
     "SafeSet",
@@ -154,6 +157,7 @@ __all__ = [
     "next_tasks",
     "prepare",
     "rank_errors",
+    "rare_violations",
     "read_demonstrations",
     "refine",
     "rollout",

@@ -15,7 +15,8 @@ from mlci.cells.refined_model import RefinedModel
 from mlci.demonstrations import Task
 from mlci.evidence import decided_by_cell
 from mlci.maxent import TrajectoryDistribution
-from mlci.sampled.distribution import SampledDistribution, SampledModel
+from mlci.sampled.distribution import SampledDistribution
+from mlci.sampled.model import SampledModel
 from mlci.sampling_errors import SamplingErrors
 from mlci.spaces import Bools, Floats
 from mlci.tabular import TabularModel

@@ -16,7 +16,7 @@ from mlci.demonstrations import Demonstration
 from mlci.inference import Inference
 from mlci.json_numbers import finite
 from mlci.preparation import infer
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 from mlci.spaces import Bools, Floats, Ints
 from mlci.tabular import Progress
 

@@ -141,11 +141,12 @@ MLCI = {
     "mlci.sampled.proposals": "mlci.sampled.local_policies",
     "mlci.sampled.adaptation": "mlci.sampled.proposals mlci.sampled.weights",
     "mlci.sampled.diagnosis": "mlci.spaces",
-    "mlci.sampled.model_check": "mlci.spaces",
-    "mlci.sampled.distribution": "mlci.sampled.adaptation mlci.sampled.diagnosis "
-    "mlci.sampled.model_check",
+    "mlci.sampled.model_check": "mlci.systems",
+    "mlci.sampled.distribution": "mlci.sampled.adaptation mlci.sampled.diagnosis",
+    "mlci.sampled.model": "mlci.sampled.distribution mlci.sampled.model_check",
+    "mlci.sampled.rare_regions": "mlci.sampled.distribution",
     "mlci.models": "mlci.cells.refined_model mlci.evidence mlci.maxent "
-    "mlci.sampled.distribution mlci.sampling_errors",
+    "mlci.sampled.model mlci.sampling_errors",
     "mlci.preparation": "mlci.inference mlci.models",
     "mlci.rank_errors": "mlci.json_numbers mlci.preparation",
     "mlci.similar_tasks": "mlci.demonstrator mlci.models",

@@ -16,7 +16,7 @@ from mlci.demonstrations import Demonstration
 from mlci.maxent import TrajectoryDistribution
 from mlci.metrics import final_state_error, violation_distance
 from mlci.models import Model, distribution_of
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 from mlci.simulate import rollout
 from mlci.spaces import Bools, Floats, Ints
 from mlci.systems import System

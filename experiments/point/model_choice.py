@@ -15,7 +15,7 @@ from mlci.demonstrations import Demonstration
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.sampled.diagnosis import SamplingDiagnosis
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 from mlci.spaces import Box, Floats
 from mlci.tabular import TabularModel, discretize
 

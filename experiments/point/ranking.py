@@ -14,7 +14,7 @@ from mlci.inference import Inference
 from mlci.models import Model
 from mlci.preparation import infer
 from mlci.rank_errors import RankErrors, infer_until_settled
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 
 
 def ranked(

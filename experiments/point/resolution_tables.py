@@ -20,7 +20,7 @@ from mlci.demonstrations import Task
 from mlci.exploration import explore
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 from mlci.spaces import Floats
 from mlci.tabular import TabularModel
 

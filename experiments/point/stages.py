@@ -28,7 +28,7 @@ from mlci.models import Model
 from mlci.regions import Regions
 from mlci.safety.constant_controls import tabulate_escapes
 from mlci.safety.reachability import SafeSet, solve_safe_set
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 from mlci.single_moves import SingleMoves
 from mlci.systems import System
 from mlci.tabular import TabularModel, discretize, moves_are_kept

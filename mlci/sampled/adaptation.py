@@ -16,14 +16,14 @@ from mlci.sampled.modes import Modes
 from mlci.sampled.passage import Passage
 from mlci.sampled.proposals import Draws, Proposal, draw
 from mlci.sampled.weights import effective_count
-from mlci.spaces import Floats
+from mlci.spaces import Bools, Floats
 
 _KEPT = 0.2  # of the samples comes from the policies that are fitted to no sample
 _FLATTER = 0.8  # power of the modes' probabilities that shares of samples follow
 _EVEN = 0.1  # of the samples is for all modes alike
 _FEWEST, _MOST = 2, 6  # rounds
 _ENOUGH = 0.25  # effective share of the samples, from which a round more is not worth its time
-_NEEDED = 20  # effective samples for each coefficient of a refit
+NEEDED = 20  # effective samples for each coefficient of a refit
 _IN_GOAL = 0.05  # of a pilot is in the goal, or a wider one takes its place
 
 
@@ -39,13 +39,14 @@ def adapted_proposal(
         pilot: samples of each round.
         rng: draws the pilots.
     """
+    needed = NEEDED * (1 + len(passage.start))
     first, log_integral = riccati_policies(passage, modes)
     latest, shares = first, scipy.special.softmax(log_integral)
     for number in range(1, _MOST + 1):
         proposal = _mixture(first, latest, shares, pilot)
         draws = draw(passage, proposal, rng)
         log_weight = np.where(draws.reached, draws.log_weight, -np.inf)
-        weight = _flattened(draws, _NEEDED * (1 + len(passage.start)))
+        weight = flattened(draws, needed, np.ones(len(log_weight), dtype=bool))
         latest = refit(
             latest,
             draws.paths[:, : -1 : passage.substeps],
@@ -61,23 +62,28 @@ def adapted_proposal(
 
 def _mixture(first: LocalPolicies, latest: LocalPolicies, shares: Floats, samples: int) -> Proposal:
     """The policies fitted to no sample and the latest, by the modes' probabilities (M,)."""
-    flatter = shares**_FLATTER
-    even = np.full(len(shares), 1 / len(shares))
-    of_modes = (1 - _EVEN) * flatter / np.sum(flatter) + _EVEN * even
+    of_modes = spread(shares)
     if latest is first:
         return Proposal.of(first, of_modes, samples)
     both = np.concatenate([_KEPT * of_modes, (1 - _KEPT) * of_modes])
     return Proposal.of(first.joined(latest), both, samples)
 
 
-def _flattened(draws: Draws, needed: int) -> Floats:
+def spread(shares: Floats) -> Floats:
+    """Shares (M,) of samples of modes, by their probabilities (M,) of any sum: less unequal."""
+    flatter = shares**_FLATTER
+    even = np.full(len(shares), 1 / len(shares))
+    return np.asarray((1 - _EVEN) * flatter / np.sum(flatter) + _EVEN * even)
+
+
+def flattened(draws: Draws, needed: int, allowed: Bools) -> Floats:
     """Weights (N,) for a refit, which add up to 1: of the goal or a wider one, as near to the true
-    ones as leaves an effective number of samples."""
-    stays = draws.log_weight > -np.inf
+    ones as leaves an effective number of samples; 0 for paths (N,) that are not allowed."""
+    stays = allowed & (draws.log_weight > -np.inf)
     if not stays.any():
         return np.full(len(stays), 1 / len(stays))
     reach = max(1.0, float(np.quantile(draws.excess[stays], _IN_GOAL)))
-    log_weight = np.where(draws.excess <= reach, draws.log_weight, -np.inf)
+    log_weight = np.where(stays & (draws.excess <= reach), draws.log_weight, -np.inf)
     needed = min(needed, int(np.sum(log_weight > -np.inf)) // 2)
     power = 1.0
     while effective_count(_power(log_weight, power)) < needed and power > 1e-3:

@@ -17,103 +17,29 @@ import numpy as np
 import scipy  # loads scipy.special when it is first used
 from numpy.typing import ArrayLike
 
-from mlci.demonstrations import REACHED, Task
 from mlci.regions import Regions, as_mask
 from mlci.sampled import weights
 from mlci.sampled.adaptation import adapted_proposal
 from mlci.sampled.diagnosis import SamplingDiagnosis
-from mlci.sampled.model_check import check_model
-from mlci.sampled.modes import Modes, find_modes
+from mlci.sampled.modes import Modes
 from mlci.sampled.passage import Passage
-from mlci.sampled.proposals import draw
-from mlci.simulate import step_count
-from mlci.spaces import Bools, Box, Floats, Ints
-from mlci.systems import System
+from mlci.sampled.proposals import Proposal, draw
+from mlci.spaces import Bools, Floats, Ints
 
-ROUNDED_TIMES = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
-_SEARCH, _DRAWS, _REPLICATES = range(3)  # a generator each, so that none depends on another
+SEARCH, _DRAWS, _REPLICATES = range(3)  # a generator each, so that none depends on another
 _PILOT = 1000  # samples of a pilot at least, if there are so many of the task
 _PAIRS_AT_ONCE = 4_000_000  # of paths and regions
 
 
 @dataclass(frozen=True, eq=False)
-class SampledModel:
-    """What distributions of tasks are made of: it takes the place of a `TabularModel`.
-
-    Attributes:
-        system: dynamics, running reward, state space.
-        regions: the C regions.
-        dt: for which a control is held [s].
-        temperature: divides the reward.
-        samples: paths of a task.
-        seed: a task's samples depend on it and on the task only.
-        substeps: Runge-Kutta steps a hold, whose chords are tested for crossings.
-        restarts: first guesses of the optimiser for each winding.
-        tolerance: half width of the goal in the dimensions in which it is a point.
-        limit: range of the controls, such as the system's control box; None for none.
-        replicates: of probabilities, from which errors of a ranking are told.
-
-    Raises:
-        ValueError: a number that is not positive, or not whole where it counts something; regions
-            or a limit of another dimension, or a limit without width.
-    """
-
-    system: System
-    regions: Regions
-    dt: float
-    temperature: float = 1.0
-    samples: int = 4000
-    seed: int = 0
-    substeps: int = 4
-    restarts: int = 6
-    tolerance: float = REACHED
-    limit: Box | None = None
-    replicates: int = 200
-
-    def __post_init__(self) -> None:
-        check_model(self)
-
-    def passage(self, task: Task, *, round_horizon: bool = False) -> Passage:
-        """The random motion of a task.
-
-        Args:
-            task: the task.
-            round_horizon: take the nearest number of holds where dt does not divide the horizon.
-
-        Raises:
-            ValueError: a start outside the state space, or a horizon that dt does not divide.
-        """
-        steps = max(1, round(task.horizon / self.dt))
-        if not round_horizon:
-            steps = step_count(task.horizon, self.dt, ROUNDED_TIMES)
-        point = task.goal.widths == 0
-        goal = Box(
-            np.where(point, task.goal.lower - self.tolerance, task.goal.lower),
-            np.where(point, task.goal.upper + self.tolerance, task.goal.upper),
-        )
-        return Passage(
-            *(self.system, task.start, goal, steps, self.dt),
-            *(self.temperature, self.substeps, self.limit),
-        )
-
-    def distribution(self, task: Task, *, round_horizon: bool = False) -> SampledDistribution:
-        """The distribution of a task; arguments as of `passage`."""
-        passage = self.passage(task, round_horizon=round_horizon)
-        ends = np.concatenate([task.start, passage.goal.lower, passage.goal.upper])
-        words = np.append(ends, task.horizon).view(np.uint32).tolist()
-        key = self.seed, *words
-        modes = find_modes(passage, self.restarts, np.random.default_rng([*key, _SEARCH]))
-        return sample_passage(passage, self.regions, modes, self.samples, key)
-
-
-@dataclass(frozen=True, eq=False)
 class SampledDistribution:
-    """Weighted paths of a task; made by `SampledModel.distribution`.
+    """Weighted paths of a task; made by `mlci.SampledModel.distribution`.
 
     Attributes:
         passage: what they are paths of.
         regions: the C regions.
         modes: the modes that were found.
+        proposal: what the paths were drawn from; None without a mode.
         paths: (B, K+1, n) states of the paths that count, not wrapped.
         weight: (B,) weight of each; they add up to 1 if there is any.
         reached: (N,) which of all the paths that were drawn are these: the others have no weight.
@@ -122,11 +48,13 @@ class SampledDistribution:
         log_z_error: its standard error.
         diagnosis: whether to believe it.
         key: what its generators are seeded with.
+        truth: (C,) regions that paths keep out of.
     """
 
     passage: Passage
     regions: Regions
     modes: Modes
+    proposal: Proposal | None
     paths: Floats
     weight: Floats
     reached: Bools
@@ -135,6 +63,7 @@ class SampledDistribution:
     log_z_error: float
     diagnosis: SamplingDiagnosis
     key: tuple[int, ...]
+    truth: Bools
 
     @property
     def is_possible(self) -> bool:
@@ -155,7 +84,8 @@ class SampledDistribution:
             ValueError: no path reaches the goal.
         """
         self._require_possible()
-        return np.clip(self.weight @ self.avoided, 0.0, 1.0)
+        alpha = np.clip(self.weight @ self.avoided, 0.0, 1.0)
+        return np.where(np.all(self.avoided, axis=0), 1.0, alpha)  # else rounding moves it
 
     def violation_probabilities(self) -> Floats:
         """Phi_i = 1 - alpha_i (C,)."""
@@ -246,6 +176,7 @@ class SampledDistribution:
             log_z=self.log_z + (float(np.log(alpha)) if alpha > 0 else -np.inf),
             log_z_error=error if alpha > 0 else np.inf,
             diagnosis=replace(self.diagnosis, effective=1 / square if square > 0 else 0.0),
+            truth=self.truth | mask,
         )
         vars(constrained)["avoided"] = self.avoided[kept]
         return constrained
@@ -270,12 +201,13 @@ def sample_passage(
 ) -> SampledDistribution:
     """Weighted paths of a passage, from policies round its modes; the key seeds the draws."""
     rng = np.random.default_rng([*key, _DRAWS])
+    free = np.zeros(len(regions), dtype=bool)
     if not len(modes):
         nothing, paths = np.zeros(0), np.zeros((0, 2, len(passage.start)))
         none = nothing, nothing.astype(bool), nothing.astype(np.int64)
         diagnosis = SamplingDiagnosis(0, 0.0, 0.0, np.inf, nothing, 0.0, 0)
-        of_nothing = paths, *none, -np.inf, np.inf, diagnosis, key
-        return SampledDistribution(passage, regions, modes, *of_nothing)
+        of_nothing = paths, *none, -np.inf, np.inf, diagnosis, key, free
+        return SampledDistribution(passage, regions, modes, None, *of_nothing)
     pilot = max(min(samples, _PILOT), samples // 3)
     proposal, rounds = adapted_proposal(passage, modes, samples, pilot, rng)
     draws = draw(passage, proposal, rng)
@@ -295,6 +227,6 @@ def sample_passage(
     )
     error = float(weights.sum_error(weights.deviations(weight, draws.component)))
     return SampledDistribution(
-        *(passage, regions, modes, draws.paths[reached], weight[reached], reached),
-        *(draws.component, log_total - np.log(count), error, diagnosis, key),
+        *(passage, regions, modes, proposal, draws.paths[reached], weight[reached], reached),
+        *(draws.component, log_total - np.log(count), error, diagnosis, key, free),
     )

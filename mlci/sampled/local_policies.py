@@ -53,6 +53,10 @@ class LocalPolicies:
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return LocalPolicies(*(np.concatenate(pair) for pair in pairs))
 
+    def of(self, numbers: slice) -> LocalPolicies:
+        """Some of these policies."""
+        return LocalPolicies(*(each[numbers] for each in vars(self).values()))
+
     def means(self, number: int, states: Floats) -> Floats:
         """(N, T, m) mean controls of a policy at states (N, T, n)."""
         apart = states - self.states[number]

@@ -9,7 +9,7 @@ Where the control has a limit, normal distributions are truncated, one control g
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy  # loads scipy.special when it is first used
@@ -50,6 +50,20 @@ class Proposal:
         count = np.maximum(1, np.round(samples * np.outer(shares, _SHARES).ravel()))
         return cls(policies, policy, np.tile(widths, len(policies)), count.astype(np.int64))
 
+    def resized(self, samples: int) -> Proposal:
+        """The same mixture with so many samples, or nearly; at least one of each component."""
+        count = np.round(samples * self.count / np.sum(self.count)).astype(np.int64)
+        return replace(self, count=np.maximum(1, count))
+
+    def joined(self, other: Proposal) -> Proposal:
+        """The components of this mixture, then the other's."""
+        return Proposal(
+            self.policies.joined(other.policies),
+            np.concatenate([self.policy, other.policy + len(self.policies)]),
+            np.concatenate([self.width, other.width]),
+            np.concatenate([self.count, other.count]),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Draws:
@@ -80,14 +94,20 @@ class Draws:
 
 def draw(passage: Passage, proposal: Proposal, rng: np.random.Generator) -> Draws:
     """Draw paths from a proposal and weigh them; one that diverges has no weight, and no mode."""
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _drawn(passage, proposal, rng)
-
-
-def _drawn(passage: Passage, proposal: Proposal, rng: np.random.Generator) -> Draws:
-    """See `draw`."""
     component = np.repeat(np.arange(len(proposal.count)), proposal.count)
-    paths, controls = _roll_out(passage, proposal, component, rng)
+    uniform = rng.random((passage.steps, len(component), proposal.policies.mean.shape[-1]))
+    return weigh(passage, proposal, component, uniform)
+
+
+def weigh(passage: Passage, proposal: Proposal, component: Ints, uniform: Floats) -> Draws:
+    """Follow components (N,) of a proposal and weigh the paths; arguments as of `roll_out`."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _weighed(passage, proposal, component, uniform)
+
+
+def _weighed(passage: Passage, proposal: Proposal, component: Ints, uniform: Floats) -> Draws:
+    """See `weigh`."""
+    paths, controls = roll_out(passage, proposal, component, uniform)
     log_densities = _log_densities(passage, proposal, paths[:, : -1 : passage.substeps], controls)
     shares = proposal.count / np.sum(proposal.count)
     log_parts = log_densities + np.log(shares)
@@ -102,14 +122,20 @@ def _drawn(passage: Passage, proposal: Proposal, rng: np.random.Generator) -> Dr
     return Draws(component, controls, paths, log_weight, excess, mode_share)
 
 
-def _roll_out(
-    passage: Passage, proposal: Proposal, component: Ints, rng: np.random.Generator
+def roll_out(
+    passage: Passage, proposal: Proposal, component: Ints, uniform: Floats
 ) -> tuple[Floats, Floats]:
-    """Paths (N, K+1, n) and controls (N, T, m) of some components (N,)."""
+    """Paths (N, K+1, n) and controls (N, T, m) of some components (N,).
+
+    Args:
+        passage: the passage.
+        proposal: the proposal.
+        component: (N,) the component that each path follows.
+        uniform: (T, N, m) numbers in [0, 1), which decide on each control, one hold after another.
+    """
     policies, policy = proposal.policies, proposal.policy[component]
     width, count = proposal.width[component][:, None], len(component)
     m, substeps = policies.mean.shape[-1], passage.substeps
-    uniform = rng.random((passage.steps, count, m))
     path = np.empty((passage.steps * substeps + 1, len(passage.start), count))
     controls = np.empty((passage.steps, m, count))
     states = np.broadcast_to(passage.start[:, None], path.shape[1:]).T

@@ -33,8 +33,8 @@ from experiments.tracking.study import collated, write_collated
 from mlci.demonstrations import Task
 from mlci.mechanics.planar_chain import PlanarChain
 from mlci.regions import Regions
-from mlci.sampled.distribution import SampledModel
 from mlci.sampled.local_policies import riccati_policies
+from mlci.sampled.model import SampledModel
 from mlci.sampled.modes import find_modes
 from mlci.sampled.proposals import Proposal, draw
 from mlci.spaces import Box

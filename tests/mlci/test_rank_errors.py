@@ -10,7 +10,7 @@ from mlci.models import forecasters
 from mlci.preparation import infer, prepare
 from mlci.rank_errors import RankErrors, infer_until_settled, rank_errors, sampling_record
 from mlci.regions import Regions
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 from mlci.sampling_errors import SamplingErrors
 from mlci.simulate import rollout
 from mlci.spaces import Box, Floats

@@ -14,7 +14,7 @@ from experiments.tracking.store import Store
 from mlci.demonstrations import Task
 from mlci.grids import Grid
 from mlci.preparation import prepare
-from mlci.sampled.distribution import SampledModel
+from mlci.sampled.model import SampledModel
 from mlci.spaces import Floats
 from mlci.tabular import discretize
 

@@ -10,7 +10,8 @@ from mlci.maxent import TrajectoryDistribution
 from mlci.models import forecast_of
 from mlci.preparation import infer
 from mlci.regions import Regions
-from mlci.sampled.distribution import SampledModel, SamplingDiagnosis
+from mlci.sampled.diagnosis import SamplingDiagnosis
+from mlci.sampled.model import SampledModel
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import FunctionSystem, Pendulum, TelescopingPendulum
 from mlci.tabular import action_grid, discretize

@@ -1,0 +1,89 @@
+"""What sampled distributions of tasks are made of, in the place of a tabular model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlci.demonstrations import REACHED, Task
+from mlci.regions import Regions
+from mlci.sampled.distribution import SEARCH, SampledDistribution, sample_passage
+from mlci.sampled.model_check import check_model
+from mlci.sampled.modes import find_modes
+from mlci.sampled.passage import Passage
+from mlci.simulate import step_count
+from mlci.spaces import Box
+from mlci.systems import System
+
+ROUNDED_TIMES = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
+
+
+@dataclass(frozen=True, eq=False)
+class SampledModel:
+    """What distributions of tasks are made of: it takes the place of a `TabularModel`.
+
+    Attributes:
+        system: dynamics, running reward, state space.
+        regions: the C regions.
+        dt: for which a control is held [s].
+        temperature: divides the reward.
+        samples: paths of a task.
+        seed: a task's samples depend on it and on the task only.
+        substeps: Runge-Kutta steps a hold, whose chords are tested for crossings.
+        restarts: first guesses of the optimiser for each winding.
+        tolerance: half width of the goal in the dimensions in which it is a point.
+        limit: range of the controls, such as the system's control box; None for none.
+        replicates: of probabilities, from which errors of a ranking are told.
+
+    Raises:
+        ValueError: a number that is not positive, or not whole where it counts something; regions
+            or a limit of another dimension, or a limit without width.
+    """
+
+    system: System
+    regions: Regions
+    dt: float
+    temperature: float = 1.0
+    samples: int = 4000
+    seed: int = 0
+    substeps: int = 4
+    restarts: int = 6
+    tolerance: float = REACHED
+    limit: Box | None = None
+    replicates: int = 200
+
+    def __post_init__(self) -> None:
+        check_model(self)
+
+    def passage(self, task: Task, *, round_horizon: bool = False) -> Passage:
+        """The random motion of a task.
+
+        Args:
+            task: the task.
+            round_horizon: take the nearest number of holds where dt does not divide the horizon.
+
+        Raises:
+            ValueError: a start outside the state space, or a horizon that dt does not divide.
+        """
+        steps = max(1, round(task.horizon / self.dt))
+        if not round_horizon:
+            steps = step_count(task.horizon, self.dt, ROUNDED_TIMES)
+        point = task.goal.widths == 0
+        goal = Box(
+            np.where(point, task.goal.lower - self.tolerance, task.goal.lower),
+            np.where(point, task.goal.upper + self.tolerance, task.goal.upper),
+        )
+        return Passage(
+            *(self.system, task.start, goal, steps, self.dt),
+            *(self.temperature, self.substeps, self.limit),
+        )
+
+    def distribution(self, task: Task, *, round_horizon: bool = False) -> SampledDistribution:
+        """The distribution of a task; arguments as of `passage`."""
+        passage = self.passage(task, round_horizon=round_horizon)
+        ends = np.concatenate([task.start, passage.goal.lower, passage.goal.upper])
+        words = np.append(ends, task.horizon).view(np.uint32).tolist()
+        key = self.seed, *words
+        modes = find_modes(passage, self.restarts, np.random.default_rng([*key, SEARCH]))
+        return sample_passage(passage, self.regions, modes, self.samples, key)
