@@ -35,7 +35,7 @@ from experiments.point.recorded import (
     recorded_weights,
     together,
 )
-from experiments.point.recorded_next import recorded_next_tasks
+from experiments.point.recorded_next import candidate_tasks, recorded_next_tasks
 from experiments.point.recorded_tables import demonstration_tables, path_table
 from experiments.point.stages import formed_model
 from experiments.progress import begin, steps_shown
@@ -104,6 +104,8 @@ def infer(settings: RecordedSettings) -> int:
         print(f"no demonstration could be used{why}")
         return FAILED
     results = writable_results(settings)
+    if settings.next_tasks.count:
+        candidate_tasks(settings, 1.0)  # a table that cannot be used is refused before the work
     checks = plausibilities(settings, demonstrations)
     say(doubt_lines(checks))
     begin("forming the model")

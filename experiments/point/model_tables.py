@@ -105,7 +105,7 @@ def _sampling(settings: Settings, point: PointInference) -> dict[str, float]:
     settled, sampling = errors.settled[inference.order], inference.sampling
     row = {"rank": np.nan, "rank_lowest": np.nan, "rank_highest": np.nan}
     if len(covered):
-        best = covered[np.argmax(errors.rank[covered])]
+        best = covered[np.argmin(errors.rank[covered])]
         row = {
             "rank": float(errors.rank[best]),
             "rank_lowest": float(errors.lowest[best]),

@@ -8,6 +8,7 @@ from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.kinds import (
     STRICT,
+    Candidates,
     Count,
     CountOrNone,
     DepthShare,
@@ -53,7 +54,7 @@ class NextTasksSettings:
 
     count: Annotated[CountOrNone, about("tasks to record next that are named; 0 names none")]
     candidates: Annotated[
-        Count, about("tasks that are drawn, and of which the most informative are named")
+        Candidates, about("tasks that are drawn, and of which the most informative are named")
     ]
     box: Annotated[
         TaskBoxSettings | None,
