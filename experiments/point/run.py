@@ -18,6 +18,7 @@ from experiments.console import (
 from experiments.point.dynamics_tables import dynamics_table
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
+from experiments.point.stages import cost_lines
 from experiments.point.tables import point_tables
 from experiments.point.transfer_tables import transfer_tables
 from experiments.progress import begin
@@ -39,6 +40,8 @@ def run_point(
         Tables by name, see `experiments.point.tables.point_tables`; if asked for,
         those of `transfer_tables` and `dynamics_table`.
     """
+    for line in cost_lines(settings):
+        log(line)
     begin("ranking hypotheses")
     inferred = infer_point(settings, store)
     inference, space, top = inferred.inference, settings.model.space, settings.ranks.top

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from experiments.config.settings.kinds import STRICT, Count, Positive, Seed, about
+from experiments.config.settings.kinds import STRICT, Count, Positive, Seed, Tasks, about
 from experiments.config.settings.parts import GridSettings, Shape, TaskSettings
 from experiments.config.settings.point import SubjectSettings
 from mlci.grids import Grid
@@ -38,7 +38,7 @@ class AdviceSettings(SubjectSettings):
         ),
     ]
     horizon: Annotated[Positive, about("duration of a task", "s")]
-    pairs: Annotated[Count, about("tasks that are drawn")]
+    pairs: Annotated[Tasks, about("tasks that are drawn")]
     seed: Annotated[Seed, about("of all that is random")]
 
     @property
