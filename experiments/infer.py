@@ -35,9 +35,9 @@ from experiments.point.recorded import (
     recorded_weights,
     together,
 )
-from experiments.point.recorded_next import recorded_next_tasks
+from experiments.point.recorded_next import candidate_tasks, recorded_next_tasks
 from experiments.point.recorded_tables import demonstration_tables, path_table
-from experiments.point.stages import formed_model
+from experiments.point.stages import cost_lines, formed_model
 from experiments.progress import begin, steps_shown
 from experiments.terminal import complain, counted, entry, say
 from experiments.tracking.environment import environment
@@ -104,8 +104,10 @@ def infer(settings: RecordedSettings) -> int:
         print(f"no demonstration could be used{why}")
         return FAILED
     results = writable_results(settings)
+    if settings.next_tasks.count:
+        candidate_tasks(settings, 1.0)  # a table that cannot be used is refused before the work
     checks = plausibilities(settings, demonstrations)
-    say(doubt_lines(checks))
+    say([*doubt_lines(checks), *cost_lines(settings)])
     begin("forming the model")
     model = formed_model(settings, settings.candidates)
     if settings.inference.calibrate and calibration is None:

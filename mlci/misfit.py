@@ -16,6 +16,7 @@ distance from what is expected (11). They are compared with two kinds of paths:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
@@ -48,6 +49,7 @@ class Misfit:
         excess: (N,) the distance less its floor sum_i 2 Phi_i (1 - Phi_i).
         unlike_p: (N,) p of an excess at least as large, among simulated demonstrations; NaN where
             there are too few of these for a p below 0.01, or the model cannot do the task.
+        simulated: n, the number of simulated demonstrations.
     """
 
     count: Ints
@@ -56,6 +58,7 @@ class Misfit:
     distance_p: Floats
     excess: Floats
     unlike_p: Floats
+    simulated: int = 0
 
     @property
     def is_rare(self) -> Bools:
@@ -86,7 +89,7 @@ class Misfit:
                 + listed([names[j] for j in rare])
             ]
         unlike, count = np.flatnonzero(self.is_unlike).tolist(), int(np.sum(known))
-        chance = scipy.special.bdtrc(len(unlike) - 1, count, RARE) if len(unlike) else 1.0
+        chance = _chance(len(unlike), count, self.simulated)
         if chance > _ALARM:
             return []
         return [
@@ -143,7 +146,7 @@ def misfit(
         tails = [_tail(counts >= count[j]), _tail(counts <= count[j])]
         count_p[j] = min(1.0, 2 * min(tails))
         distance_p[j] = _tail(distances >= distance[j] - 1e-9)  # a tie, but for rounding
-    return Misfit(count, distance, count_p, distance_p, excess, unlike_p)
+    return Misfit(count, distance, count_p, distance_p, excess, unlike_p, len(others))
 
 
 @singledispatch
@@ -205,3 +208,27 @@ def draw_among(
 def _tail(extreme: Bools) -> float:
     """p of a Monte Carlo test, of which samples are at least as extreme."""
     return (1 + int(np.sum(extreme))) / (1 + len(extreme))
+
+
+def _chance(unlike: int, count: int, simulated: int) -> float:
+    """Probability that so many or more of N demonstrations are unlike n that are like them.
+
+    That is that so many of the N are above the r-th largest of the n, with the largest r below
+    0.01 (n + 1). As all orders of the N + n are equally probable, k are with probability
+    C(k + r - 1, k) C(N - k + n - r, N - k) / C(N + n, N).
+    """
+    rank = math.ceil(RARE * (simulated + 1)) - 1  # p is below 0.01, not equal to it
+    k = np.arange(unlike, count + 1)
+    total = _log_choose(count + simulated, count)
+    above, below = (
+        _log_choose(k + rank - 1, k),
+        _log_choose(count - k + simulated - rank, count - k),
+    )
+    return float(np.sum(np.exp(above + below - total)))
+
+
+def _log_choose(of: ArrayLike, taken: ArrayLike) -> Floats:
+    """log of the binomial coefficient."""
+    n, k = np.asarray(of, dtype=float), np.asarray(taken, dtype=float)
+    log = scipy.special.gammaln
+    return np.asarray(log(n + 1) - log(k + 1) - log(n - k + 1))

@@ -15,9 +15,10 @@ from mlci.recordings.paths import Repair
 from mlci.recordings.plausibility import Plausibility, plausibility
 from mlci.recordings.read import Readings, read_demonstrations
 from mlci.recordings.recording import Remark
-from mlci.recordings.task_table import read_task_table
+from mlci.recordings.task_table import Ends, read_task_table
 from mlci.recordings.times import refuse_long
 from mlci.soft.weight import WeightEstimate, best_forgiven, estimate_weights
+from mlci.spaces import StateSpace
 from mlci.tabular import TabularModel
 
 _OVERSTATED = (
@@ -32,10 +33,8 @@ def read_recordings(settings: RecordedSettings) -> Readings:
     Raises:
         ConfigError: a table of tasks that cannot be used.
     """
-    try:
-        tasks = settings.tasks and read_task_table(settings.tasks, settings.model.space)
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"tasks: {error}") from None
+    space = settings.model.space
+    tasks = None if settings.tasks is None else task_table("tasks", settings.tasks, space)
     group_by = settings.group_by or ()
     readings = read_demonstrations(
         settings.demonstrations,
@@ -48,7 +47,7 @@ def read_recordings(settings: RecordedSettings) -> Readings:
         repair=Repair(
             settings.bridge * settings.cells.widths, settings.derive or {}, settings.derive_window
         ),
-        tasks=tasks or None,
+        tasks=tasks,
         start=settings.start,
         goal=None if settings.goal is None else settings.goal.box(),
         max_memory=settings.max_memory,
@@ -69,6 +68,20 @@ def read_recordings(settings: RecordedSettings) -> Readings:
     if usable and not (settings.inference.calibrate or settings.crossing.crossing().is_any):
         readings.notes.append(Remark("crossing", _OVERSTATED))
     return readings._replace(demonstrations=usable)
+
+
+def task_table(key: str, file: str, space: StateSpace) -> dict[str, Ends]:
+    """The tasks of a table that an option names.
+
+    Raises:
+        ConfigError: a table that is not there or cannot be used; the message begins with the key.
+    """
+    try:
+        return read_task_table(file, space)
+    except OSError as error:
+        raise ConfigError(f"{key}: {file}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise ConfigError(f"{key}: {error}") from None
 
 
 def plausibilities(

@@ -8,12 +8,12 @@ import numpy as np
 
 from experiments.config.problems import ConfigError
 from experiments.config.settings import RecordedSettings
+from experiments.point.recorded import task_table
 from experiments.progress import begin
 from mlci.demonstrations import Demonstration, Task
 from mlci.inference import Inference
 from mlci.models import Model
 from mlci.next_task import NextTask, next_tasks
-from mlci.recordings.task_table import read_task_table
 from mlci.spaces import Box
 
 
@@ -66,10 +66,7 @@ def candidate_tasks(settings: RecordedSettings, horizon: float) -> dict[str, Tas
             str(number): Task(start, Box(goal + reach.lower, goal + reach.upper), horizon)
             for number, (start, goal) in enumerate(ends)
         }
-    try:
-        table = read_task_table(chosen.file, space)
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"next_tasks.file: {error}") from None
+    table = task_table("next_tasks.file", chosen.file, space)
     tasks = {}
     for name, ends_of in table.items():
         if ends_of.start is None or ends_of.goal is None:

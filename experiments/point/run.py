@@ -18,6 +18,7 @@ from experiments.console import (
 from experiments.point.dynamics_tables import dynamics_table
 from experiments.point.inference import infer_point, point_answer
 from experiments.point.measures import measure_point
+from experiments.point.stages import cost_lines
 from experiments.point.tables import point_tables
 from experiments.point.transfer_tables import transfer_tables
 from experiments.point.truth_draw import with_truth
@@ -41,6 +42,8 @@ def run_point(
         those of `transfer_tables` and `dynamics_table`.
     """
     settings = with_truth(settings, store)
+    for line in cost_lines(settings):
+        log(line)
     begin("ranking hypotheses")
     inferred = infer_point(settings, store)
     inference, space, top = inferred.inference, settings.model.space, settings.ranks.top

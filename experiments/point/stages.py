@@ -21,10 +21,12 @@ import mlci.shapes.balls
 import mlci.shapes.half_spaces
 import mlci.tabular
 from experiments.config.settings import ESCAPES, ModelSettings, Settings, ShapeList, SubjectSettings
+from experiments.terminal import entry
 from experiments.tracking.store import Store, Stored
 from mlci.cells.refined_model import RefinedModel
 from mlci.grids import Grid
 from mlci.models import Model
+from mlci.paths import substep_count
 from mlci.regions import Regions
 from mlci.safety.constant_controls import tabulate_escapes
 from mlci.safety.reachability import SafeSet, solve_safe_set
@@ -36,6 +38,7 @@ from mlci.tabular import TabularModel, discretize, moves_are_kept
 # What is stored of the moves of a tabular model, and of the sparse matrix of their crossings.
 _MOVES = ("successor", "reward")
 _CROSSINGS = ("indices", "indptr")
+_MANY_STEPS = 1e7  # of the dynamics while cells are formed; an arm of two links takes 1 us each
 
 
 def safe_set_inputs(settings: Settings) -> tuple[Any, ...]:
@@ -170,6 +173,23 @@ def _discretized(
     modules = [mlci.tabular, system_module(settings.model), sys.modules[__name__]]
     modules += shape_modules(settings, regions)
     return store.get(stage, model_inputs(settings, regions), modules, compute)
+
+
+def cost_lines(settings: ModelSettings) -> list[str]:
+    """What cells are going to cost where that is much, and what does without; else nothing."""
+    if settings.sampling is not None:
+        return []
+    cells, actions = settings.cells, settings.action_values
+    moves = cells.size * len(actions) * settings.transition.samples**cells.space.dimension
+    steps = moves * substep_count(settings.model, cells, actions, settings.dt)
+    if steps < _MANY_STEPS:
+        return []
+    return entry(
+        "cells",
+        f"{moves:.3g} moves take {steps:.3g} steps of the dynamics, and each task passes over them "
+        "all: minutes, and hours where moves are 1e8. model=sampled does without cells; fewer of "
+        "these, actions or transition.samples take less",
+    )
 
 
 def discretized_model(settings: ModelSettings, regions: Regions) -> TabularModel:

@@ -13,6 +13,7 @@ from mlci.diagnosis import Diagnosis, diagnose
 from mlci.evidence import DEFAULT_MODEL_ERROR
 from mlci.maxent import TrajectoryDistribution
 from mlci.outlook.flow import control_reach, flow_expansion
+from mlci.regions import as_mask
 from mlci.spaces import Bools, Box, Floats
 from mlci.tabular import TabularModel
 
@@ -118,11 +119,11 @@ def outlook(
         hypotheses: (C',) mask over its regions; None takes all.
 
     Raises:
-        ValueError: no path.
+        ValueError: no path, or a mask of another length.
     """
     if not paths:
         raise ValueError("an outlook needs the optimal path of a task at least")
-    mask = np.ones(len(model.regions), dtype=bool) if hypotheses is None else np.asarray(hypotheses)
+    mask = as_mask(hypotheses, len(model.regions))
     phi = np.zeros((len(paths), int(np.sum(mask))))
     reachable = np.zeros(len(paths), dtype=bool)
     for number, path in enumerate(paths):

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy  # loads scipy.special when it is first used
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mlci.spaces import Floats
 
@@ -53,14 +54,20 @@ def fit_rule(features: ArrayLike, success: ArrayLike, ridge: float = _RIDGE) -> 
         ridge: what a squared weight costs [nat]; the intercept costs nothing.
 
     Raises:
-        ValueError: no case, shapes that disagree, or a value that is not finite.
+        ValueError: no case, shapes that disagree, a value that is not finite, or so large that its
+            spread is not, or a ridge below 0.
     """
     x, y = np.asarray(features, dtype=float), np.asarray(success, dtype=float)
     if x.ndim != 2 or y.shape != x.shape[:1] or not len(y):
         raise ValueError(f"features (B, F) and success (B,) do not agree: {x.shape}, {y.shape}")
     if not (np.all(np.isfinite(x)) and np.all((y >= 0) & (y <= 1))):
         raise ValueError("features must be finite, and success between 0 and 1")
-    mean, deviation = x.mean(axis=0), x.std(axis=0)
+    if not 0 <= ridge < np.inf:
+        raise ValueError(f"a ridge is a finite price of at least 0, not {ridge}")
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean, deviation = x.mean(axis=0), x.std(axis=0)
+    if not np.all(np.isfinite(deviation)):
+        raise ValueError(f"features are too large to be standardised: up to {np.max(np.abs(x)):g}")
     scale = np.where(deviation > 0, deviation, 1.0)
     z = np.column_stack([np.ones(len(y)), (x - mean) / scale])
     price = np.diag([1e-6, *[ridge] * x.shape[1]])  # a hair: all may have succeeded
@@ -76,8 +83,13 @@ def fit_rule(features: ArrayLike, success: ArrayLike, ridge: float = _RIDGE) -> 
 
 
 def left_out(features: Floats, success: Floats, groups: ArrayLike) -> Floats:
-    """(B,) probability of success of each case by a rule that was fitted without its group."""
-    groups = np.asarray(groups)
+    """(B,) probability of success of each case by a rule that was fitted without its group.
+
+    Raises:
+        ValueError: groups that are not (B,), or a single one, which leaves no case to fit; or as of
+            `fit_rule`.
+    """
+    groups = _several_groups(groups, len(success))
     probability = np.empty(len(success))
     for group in np.unique(groups):
         out = groups == group
@@ -138,7 +150,7 @@ def left_out_choice(
     features: Floats, success: Floats, groups: ArrayLike, most: int, first: Sequence[int] = ()
 ) -> Floats:
     """(B,) as `left_out`, where features are chosen anew without the group that is foretold."""
-    groups = np.asarray(groups)
+    groups = _several_groups(groups, len(success))
     probability = np.empty(len(success))
     for group in np.unique(groups):
         out = groups == group
@@ -146,3 +158,14 @@ def left_out_choice(
         rule = fit_rule(features[~out][:, chosen], success[~out])
         probability[out] = rule.probability(features[out][:, chosen])
     return probability
+
+
+def _several_groups(groups: ArrayLike, cases: int) -> NDArray[Any]:
+    """Groups (B,) of which one can be left out."""
+    labels = np.asarray(groups)
+    if labels.shape != (cases,) or len(np.unique(labels)) < 2:
+        raise ValueError(
+            f"{cases} cases need a group each, of two or more, not {labels.shape} of "
+            f"{len(np.unique(labels))}"
+        )
+    return labels

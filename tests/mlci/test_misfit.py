@@ -124,25 +124,35 @@ def test_a_demonstration_is_unlike_simulated_ones_by_the_rank_of_its_excess() ->
 
 
 def unlike(p: list[float]) -> Misfit:
-    """Demonstrations of which only their p among simulated ones is known."""
+    """Demonstrations of which only their p among 200 simulated ones is known."""
     none = np.full(len(p), np.nan)
-    return Misfit(none, none, none, none, none, np.array(p))
+    return Misfit(none, none, none, none, none, np.array(p), 200)
 
 
-def test_right_sets_are_warned_of_in_one_of_twenty_at_most() -> None:
-    """p of demonstrations that are like the simulated ones: uniform ranks among 200."""
+@pytest.mark.parametrize("simulated", [120, 200])
+def test_right_sets_are_warned_of_in_one_of_twenty_at_most(simulated: int) -> None:
+    """What is demonstrated and what is simulated come from the same distribution."""
     rng = np.random.default_rng(5)
     for count in (1, 3, 10, 65):
         names = [str(j) for j in range(count)]
-        ranks = rng.integers(1, 202, (4000, count)) / 201
-        share = np.mean([bool(unlike(row.tolist()).warnings(names)) for row in ranks])
-        assert share < 0.05 + 5 * np.sqrt(0.05 * 0.95 / 4000)
+        alarms = 0
+        for _ in range(3000):
+            others, own = rng.random(simulated), rng.random(count)
+            p = (1 + np.sum(others >= own[:, None], axis=1)) / (1 + simulated)
+            alarms += bool(replace(unlike(p.tolist()), simulated=simulated).warnings(names))
+        assert alarms / 3000 < 0.05 + 4 * np.sqrt(0.05 * 0.95 / 3000)
+        assert alarms > 0
+
+
+def test_what_is_unlike_simulated_demonstrations_is_named() -> None:
     (few,) = unlike([0.005, 0.5, 0.3]).warnings(["a", "b", "c"])
     assert few.startswith("1 of 3 demonstrations cross other regions than simulated")
-    assert "by chance in 3.0% of such sets" in few
+    # None of three is among the first two of 203: 1 - (201 200 199) / (203 202 201).
+    assert f"by chance in {1 - 201 * 200 * 199 / (203 * 202 * 201):.1%} of such sets" in few
     assert few.endswith(": a")
     assert unlike([0.005, *[0.5] * 64]).warnings([str(j) for j in range(65)]) == []
     assert unlike([0.005, np.nan]).warnings(["a", "b"])  # the other task cannot be done
+    assert unlike([0.5, 0.5]).warnings(["a", "b"]) == []
 
 
 def test_without_a_calibration_what_is_rare_is_said_to_tell_little() -> None:

@@ -8,7 +8,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.cells import GridSettings, Shape
-from experiments.config.settings.kinds import STRICT, Count, Positive, Seed, about
+from experiments.config.settings.kinds import STRICT, Count, Positive, Seed, Tasks, about
 from experiments.config.settings.parts import TaskSettings
 from experiments.config.settings.point import SubjectSettings
 from mlci.grids import Grid
@@ -39,7 +39,7 @@ class AdviceSettings(SubjectSettings):
         ),
     ]
     horizon: Annotated[Positive, about("duration of a task", "s")]
-    pairs: Annotated[Count, about("tasks that are drawn")]
+    pairs: Annotated[Tasks, about("tasks that are drawn")]
     seed: Annotated[Seed, about("of all that is random")]
 
     @property

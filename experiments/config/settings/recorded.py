@@ -16,6 +16,7 @@ from experiments.config.settings.kinds import (
     Number,
     PathWord,
     Positive,
+    Tasks,
     Word,
     about,
     one_or_list,
@@ -53,7 +54,7 @@ class NextTasksSettings:
 
     count: Annotated[CountOrNone, about("tasks to record next that are named; 0 names none")]
     candidates: Annotated[
-        Count, about("tasks that are drawn, and of which the most informative are named")
+        Tasks, about("tasks that are drawn, and of which the most informative are named")
     ]
     box: Annotated[
         TaskBoxSettings | None,

@@ -64,6 +64,15 @@ def test_a_table_that_cannot_be_used_is_refused(tmp_path: Path, text: str, words
         candidate_tasks(settings(f"next_tasks.file={file}"), 5.0)
 
 
+def test_a_table_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"^next_tasks\.file: .*gone\.csv: No such file"):
+        candidate_tasks(settings(f"next_tasks.file={tmp_path}/gone.csv"), 5.0)
+    with pytest.raises(ConfigError, match=r"^next_tasks\.file: .*: is not a file"):
+        candidate_tasks(settings(f"next_tasks.file={tmp_path}"), 5.0)
+    with pytest.raises(ConfigError, match=r"candidates: 10001 must be at most 10000"):
+        settings("next_tasks.candidates=10001")
+
+
 def test_a_box_that_does_not_fit_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"next_tasks\.box\.lower"):
         settings("next_tasks.box={lower: [1.0], upper: [2.0, null]}")

@@ -86,3 +86,16 @@ def test_the_score_is_the_mean_over_trials() -> None:
 def test_what_is_no_case_is_refused(features, success, message) -> None:
     with pytest.raises(ValueError, match=message):
         fit_rule(features, success)
+
+
+def test_numbers_that_fit_nothing_are_refused() -> None:
+    features, success, groups = cases()
+    for ridge in (-1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match=f"a ridge is a finite price .*, not {ridge}"):
+            fit_rule(features, success, ridge)
+    with pytest.raises(ValueError, match="too large to be standardised: up to"):
+        fit_rule(features * 1e300, success)
+    for foretell in (left_out, lambda *them: left_out_choice(*them, 2)):
+        for wrong in (groups[1:], np.zeros(len(success))):
+            with pytest.raises(ValueError, match="120 cases need a group each, of two or more"):
+                foretell(features, success, wrong)
