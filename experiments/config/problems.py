@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import typing
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
@@ -64,14 +64,14 @@ def checked(kind: type[T], tree: Mapping[str, Any]) -> T:
     for target in _targets(tree):
         put_on_path(target)
     try:
-        settings: T = _adapter(kind).validate_python(_without_missing(tree))
+        settings: T = _adapter(typing.cast(Any, kind)).validate_python(_without_missing(tree))
         return settings
     except ValidationError as error:
         raise ConfigError("\n".join(_lines(error, kind, tree))) from None
 
 
 @cache
-def _adapter(kind: Hashable) -> TypeAdapter[Any]:
+def _adapter(kind: Any) -> TypeAdapter[Any]:
     """What checks settings of a kind; it takes a tenth of a second to build."""
     return TypeAdapter(kind)
 
