@@ -29,6 +29,7 @@ MLCI = {
     "mlci.soft": "",
     "mlci.worlds": "",
     "mlci.compiled": "",
+    "mlci.precompile": "mlci.compiled",  # and by name those that it compiles
     "mlci.spaces": "",
     "mlci.grids": "mlci.compiled mlci.spaces",
     "mlci.cells": "",

@@ -64,7 +64,7 @@ def checked(kind: type[T], tree: Mapping[str, Any]) -> T:
     for target in _targets(tree):
         put_on_path(target)
     try:
-        settings: T = _adapter(kind).validate_python(_without_missing(tree))
+        settings: T = _adapter(typing.cast(Any, kind)).validate_python(_without_missing(tree))
         return settings
     except ValidationError as error:
         raise ConfigError("\n".join(_lines(error, kind, tree))) from None

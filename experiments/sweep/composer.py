@@ -1,8 +1,9 @@
 """The configs of a sweep's points: each choice of groups is composed once.
 
-Hydra reads every file anew for every point. But values that a point sets itself are put over what
-its groups compose to; so points which differ in values alone share all that comes before. Where
-nothing refers to anything else, they also share the parts of the config in which they set nothing.
+Hydra reads every file anew for every point; here each is read once. Values that a point sets itself
+are put over what its groups compose to; so points which differ in values alone share all that comes
+before. Where nothing refers to anything else, they also share the parts of the config in which they
+set nothing.
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ from __future__ import annotations
 import pickle
 import re
 from collections.abc import Sequence
+from copy import deepcopy
 from functools import cache
 from typing import Any
 
 from hydra.core.config_loader import ConfigLoader
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override, OverrideType
+from hydra.plugins.config_source import ConfigSource
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -30,6 +33,8 @@ class Composer:
 
     def __init__(self, loader: ConfigLoader, base: DictConfig) -> None:
         self._loader, self._base = loader, base
+        for source in loader.get_sources():
+            _read_once(source)
         self._parser = OverridesParser.create(config_loader=loader)
         self._parsed = cache(self._parser.parse_override)
         self._is_group = cache(lambda key: bool(loader.get_group_options(key)))
@@ -73,6 +78,13 @@ class Composer:
         config: Any = OmegaConf.to_container(self._loader.load_sweep_config(self._base, [*choices]))
         config.pop("hydra")
         return dict(config), _REFERENCE in str(config)
+
+
+def _read_once(source: ConfigSource) -> None:
+    """Have a source of configs remember its files, whose parsing is a third of composing."""
+    remembered: Any = cache(source.load_config)
+    anew: Any = lambda config_path: deepcopy(remembered(config_path))  # noqa: E731
+    source.load_config = anew  # type: ignore[method-assign]
 
 
 def _copy(tree: dict[str, Any]) -> dict[str, Any]:

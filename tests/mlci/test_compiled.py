@@ -14,7 +14,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+import mlci
 from mlci.compiled import Compiled
+from mlci.precompile import MODULES, precompile
 
 LOOPS = '''
 from mlci.compiled import compiled
@@ -93,6 +95,18 @@ def test_a_disk_that_is_full_stops_nothing(
     monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
     assert loops.square(3.0) == 9
     assert not list(tmp_path.rglob("*.nbc"))
+
+
+def test_all_that_is_compiled_can_be_compiled_ahead(loops: ModuleType, tmp_path: Path) -> None:
+    root = Path(mlci.__file__).parents[1]
+    written = {
+        ".".join(path.relative_to(root).with_suffix("").parts)
+        for path in root.glob("mlci/**/*.py")
+        if "\n@compiled(" in path.read_text(encoding="utf-8")
+    }
+    assert written == {*MODULES}
+    assert precompile("loops") == 2
+    assert len(list(tmp_path.rglob("*.nbc"))) == 2
 
 
 def test_numba_is_imported_by_the_first_call() -> None:
