@@ -149,8 +149,7 @@ def facts(
     """What the caption says."""
     rows = worlds(models, summary, cases)
     lines = [
-        "Worlds of arms and of a person who stands up, with sampled paths and no cells. Each has",
-        "tasks of its own, and as truth one of its hypotheses, ranges of two joints, which enough",
+        "Worlds of arms, with sampled paths and no cells. Each has tasks of its own, and as truth one of its hypotheses, ranges of two joints, which enough",
         "tasks cross. Left: share of worlds with the truth first, hollow, and among the first two,",
         "with Wilson's 95 % intervals; dotted: what is asked of six joints. Middle: the truth's",
         "posterior. Right: forecasts of what demonstrators enter whom nothing constrains, for",
