@@ -64,7 +64,7 @@ def draw(dimensions: pd.DataFrame) -> Figure:
         for axes in (left, middle):
             _on_logarithms(axes)
             axes.set_xticks(rows["value"], labels=list(map(str, rows["value"])))
-            axes.set_xlabel("dimensions n")
+            axes.set_xlabel("dimensions n [1]")
         _draw_growth(right, dimensions)
         for axes in (left, middle, right):
             axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22))
