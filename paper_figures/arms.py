@@ -121,7 +121,7 @@ def _draw_posteriors(axes: Axes, rows: pd.DataFrame, names: list[str]) -> None:
         axes.step(np.append(0, values), np.append(0, 100 * shares), where="post", color=colour)
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 103)
-    axes.set_xlabel("posterior of truth")
+    axes.set_xlabel("posterior of truth [probability]")
     axes.set_ylabel("worlds with at most that [%]")
 
 
@@ -139,8 +139,8 @@ def _draw_forecasts(axes: Axes, forecasts: pd.DataFrame, names: list[str]) -> No
             elinewidth=0.5,
             label=name,
         )
-    axes.set_xlabel("forecast $\\Phi$")
-    axes.set_ylabel("share that is crossed")
+    axes.set_xlabel("forecast $\\Phi$ [probability]")
+    axes.set_ylabel("share that is crossed [1]")
 
 
 def facts(
@@ -149,12 +149,12 @@ def facts(
     """What the caption says."""
     rows = worlds(models, summary, cases)
     lines = [
-        "Worlds of arms and of a person who stands up, with sampled paths and no cells. Each has",
-        "tasks of its own, and as truth one of its hypotheses, ranges of two joints, which enough",
-        "tasks cross. Left: share of worlds with the truth first, hollow, and among the first two,",
-        "with Wilson's 95 % intervals; dotted: what is asked of six joints. Middle: the truth's",
-        "posterior. Right: forecasts of what demonstrators enter whom nothing constrains, for",
-        "tasks that are not selected; bars: 95 % intervals from worlds that are drawn again.",
+        "Worlds of arms, with sampled paths and no cells. Each has tasks of its own, and as truth",
+        "one of its hypotheses, ranges of two joints, which enough tasks cross. Left: share",
+        "of worlds with the truth first, hollow, and among the first two, with Wilson's 95 %",
+        "intervals; dotted: what is asked of six joints. Middle: the truth's posterior.",
+        "Right: forecasts of what demonstrators enter whom nothing constrains, for tasks that are",
+        "not selected; bars: 95 % intervals from worlds that are drawn again.",
     ]
     for name, some in rows.groupby("case", sort=False):
         most = int(some["demonstrations"].max())

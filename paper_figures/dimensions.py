@@ -42,7 +42,7 @@ def slopes(dimensions: pd.DataFrame) -> pd.DataFrame:
 
 def draw(dimensions: pd.DataFrame) -> Figure:
     """Draw time and memory against dimensions, and drawing against all that makes it longer."""
-    figure, (left, middle, right) = new_figure(PAGE, 2.7, ncols=3)
+    figure, (left, middle, right) = new_figure(PAGE, 3.2, ncols=3)
     rows = dimensions[dimensions["factor"] == "dimensions"].sort_values("value")
     with plt.rc_context(RC):
         for number, (column, label) in enumerate(_TIMES.items()):
@@ -58,16 +58,16 @@ def draw(dimensions: pd.DataFrame) -> Figure:
             color=OTHER_COLOURS[1],
             linestyle="--",
             marker="s",
-            label=f"one number for each of {CELLS}$^n$ cells",
+            label=f"{CELLS}$^n$ cells, one number each",
         )
         middle.set_ylabel("memory [MB]")
         for axes in (left, middle):
             _on_logarithms(axes)
             axes.set_xticks(rows["value"], labels=list(map(str, rows["value"])))
-            axes.set_xlabel("dimensions n")
+            axes.set_xlabel("dimensions n [1]")
         _draw_growth(right, dimensions)
         for axes in (left, middle, right):
-            axes.legend(loc="upper left")
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22))
     return figure
 
 
@@ -108,8 +108,8 @@ def facts(dimensions: pd.DataFrame) -> str:
         "One task of chains of one to six links, of which each has two dimensions, without a grid:",
         "processor time of one thread (left), peak memory of the process beside that of a grid",
         f"with one number a cell, {CELLS} cells a dimension (middle), and the time to draw and",
-        "weigh paths against what makes it longer (right). One run a size, the quickest of three",
-        "for the search and for drawing, so that times have no intervals.",
+        "weigh paths against what makes it longer (right). Each time is the quickest of three, so",
+        "that there are no intervals.",
     ]
     for row in rows.sort_values("value").itertuples():
         lines.append(

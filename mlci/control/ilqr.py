@@ -111,12 +111,24 @@ def optimize(
         costs = _iterate(problem, paths, iterations, tolerance)
         if noise is not None:
             paths = _carry_out(problem, paths, np.moveaxis(noise, 1, 0))
+        _hold_where_lost(paths)
     return Solution(
         np.moveaxis(paths.states, 0, 1).copy(),
         np.moveaxis(paths.applied, 0, 1).copy(),
         terminal_excess(problem, paths.states[-1])[0],
         costs,
     )
+
+
+def _hold_where_lost(paths: Paths) -> None:
+    """Let paths that leave the range of numbers stay at their last finite state, in place.
+
+    No control is applied from there on, and their cost stays NaN or infinite.
+    """
+    known = np.logical_and.accumulate(np.all(np.isfinite(paths.states), axis=-1), axis=0)
+    last = paths.states[np.sum(known, axis=0) - 1, np.arange(known.shape[1])]
+    paths.states[~known] = np.broadcast_to(last, paths.states.shape)[~known]
+    paths.applied[~known[1:]] = 0.0
 
 
 def _first_paths(problem: ControlProblem, guess: Floats) -> Paths:

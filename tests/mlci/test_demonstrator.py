@@ -19,8 +19,8 @@ from mlci.regions import Regions
 from mlci.safety.reachability import solve_safe_set
 from mlci.safety.safety_filter import SafetyFilter, border_margin
 from mlci.simulate import RK4, euler_step, rollout
-from mlci.spaces import Box
-from mlci.systems import DoubleIntegrator, Pendulum
+from mlci.spaces import Box, StateSpace
+from mlci.systems import DoubleIntegrator, FunctionSystem, Pendulum
 
 PENDULUM = Pendulum()
 DT = 0.01
@@ -314,3 +314,19 @@ def test_of_equal_restarts_the_first_is_taken_whatever_the_rounding():
         tasks = [trial([0.5, 0.0], [3.0, 0.0], 0.0).task] * 2
         attempts = _best_of(2, tasks, solution, failures, np.zeros(4), 2.5)
         assert [attempt.restart for attempt in attempts] == [0, 0]
+
+
+def test_a_path_that_runs_away_is_one_that_left_the_bounds():
+    """x' = x^3 under Euler overflows within a few steps, whatever the optimiser tries first."""
+    space = StateSpace(Box([-3.0], [3.0]), [False], ("x",), ("m",))
+    system = FunctionSystem(lambda x, u: (x[..., 0] ** 3 + u[..., 0],), space, Box([-1.0], [1.0]))
+    task = Task(np.array([2.9]), Box.point([0.0]), 3.0)
+    trial = Trial(task, np.full((1, 30, 1), 1.0))
+    with np.errstate(over="ignore", invalid="ignore"):
+        (attempt,) = demonstrate(system, [trial], None, None, dt=0.1, iterations=1)
+    states = attempt.demonstration.states
+    assert attempt.outcome is Outcome.BOUNDS_LEFT
+    assert np.all(np.isfinite(states))
+    assert states[1] == pytest.approx(2.9 + 0.1 * (2.9**3 + 1))
+    assert states[-1] == states[-2]
+    assert not np.isfinite(attempt.cost)
