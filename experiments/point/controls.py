@@ -24,6 +24,7 @@ from experiments.point.forecasts import (
 from experiments.point.stages import system_module
 from experiments.progress import begin
 from experiments.tracking.store import Store
+from mlci.actuation.hypotheses import JoinedHypotheses
 from mlci.actuation.inference import ControlInference, calibrate_controls, infer_controls
 from mlci.actuation.ranges import ControlRanges
 from mlci.demonstrations import Demonstration
@@ -46,6 +47,8 @@ def point_controls(
     forecasts = None
     if settings.hypotheses.controls.is_asked and settings.inference.calibrate:
         modules = [mlci.actuation.inference, mlci.demonstrator, system_module(settings.model)]
+        predicates = settings.hypotheses.controls.predicates
+        modules += [sys.modules[each.target.rpartition(".")[0]] for each in predicates]
         depends = (*forecast_inputs(settings), settings.hypotheses.controls)
 
         def compute() -> dict[str, np.ndarray]:
@@ -119,23 +122,28 @@ def control_tables(
 
 
 def against_truth(settings: Settings) -> tuple[Bools, Bools]:
-    """(C,) which hypotheses are what is forbidden in truth, and which are a part of it."""
+    """(C,) which hypotheses are what is forbidden in truth, and which are a part of it; predicates
+    are neither."""
     system, truth = settings.model, ranges_of(settings.truth.controls, settings.model)
-    hypotheses, box = settings.hypotheses.controls.hypotheses(system), system.control_box
+    asked, box = settings.hypotheses.controls, system.control_box
+    hypotheses = asked.all_ranges(system)
     low, high = np.maximum(hypotheses.lower, box.lower), np.minimum(hypotheses.upper, box.upper)
     from_, to = np.maximum(truth.lower, box.lower), np.minimum(truth.upper, box.upper)
     inside = np.all((low[:, None] >= from_) & (high[:, None] <= to), axis=-1)
     same = np.all((low[:, None] == from_) & (high[:, None] == to), axis=-1)
-    return np.any(same, axis=1), np.any(inside, axis=1)
+    no_range = np.zeros(len(asked.predicates), dtype=bool)
+    return np.append(np.any(same, axis=1), no_range), np.append(np.any(inside, axis=1), no_range)
 
 
 def control_record(controls: ControlInference) -> dict[str, Any]:
-    """The belief for programs, fit for JSON."""
-    calibration, ranges = controls.calibration, controls.hypotheses
-    assert isinstance(ranges, ControlRanges)
-    ends = {
+    """The belief for programs, fit for JSON; predicates have no ends."""
+    calibration, hypotheses = controls.calibration, controls.hypotheses
+    assert isinstance(hypotheses, JoinedHypotheses)
+    ends = {name: {"lower": None, "upper": None} for name in hypotheses.names} | {
         name: {"lower": list(map(finite, low)), "upper": list(map(finite, high))}
-        for name, low, high in zip(ranges.names, ranges.lower, ranges.upper, strict=True)
+        for part in hypotheses.parts
+        if isinstance(part, ControlRanges)
+        for name, low, high in zip(part.names, part.lower, part.upper, strict=True)
     }
     return {
         "none": controls.ranking.posterior_none,
