@@ -10,8 +10,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from experiments.config.settings import ControlRange, ModelSettings, Settings
-from mlci.spaces import Box
+from mlci.actuation.predicates import ControlPredicates
+from mlci.spaces import Box, Floats
 from mlci.systems import System
+
+_STATES = 1000  # at which predicates are tried
 
 
 def control_hypothesis_problems(settings: ModelSettings) -> Iterator[str]:
@@ -19,17 +22,18 @@ def control_hypothesis_problems(settings: ModelSettings) -> Iterator[str]:
     key, controls, system = "hypotheses.controls", settings.hypotheses.controls, settings.model
     if controls.both and not controls.is_asked:
         yield (
-            f"{key}.both: {controls.both}, but no range may be forbidden; give ranges or shares, "
-            "or set it to 0"
+            f"{key}.both: {controls.both}, but nothing about controls may be forbidden; give "
+            "ranges, shares or predicates, or set it to 0"
         )
     faults = list(_range_problems(f"{key}.ranges", controls.ranges, system))
     yield from faults
     if faults:
         return
     try:
-        hypotheses = controls.hypotheses(system)
+        hypotheses = controls.all_ranges(system)
+        _ = controls.hypotheses(system)
     except ValueError as error:
-        yield f"{key}: {error}; name each range once, by ranges or by shares"
+        yield f"{key}: {error}; name each once, by ranges, by shares or by predicates"
         return
     actions = settings.action_values
     held = hypotheses.holds(np.zeros((len(actions), 0)), actions)
@@ -38,6 +42,29 @@ def control_hypothesis_problems(settings: ModelSettings) -> Iterator[str]:
             f"{key}: {hypotheses.names[i]} holds none of the {len(actions)} actions, so that the "
             "tabular model cannot tell; raise `actions`, or widen the range"
         )
+    yield from _predicate_problems(settings, actions)
+
+
+def _predicate_problems(settings: ModelSettings, actions: Floats) -> Iterator[str]:
+    """Functions that fail, return something else, or forbid no action in any of many states."""
+    system, bounds = settings.model, settings.model.space.bounds
+    rng = np.random.default_rng(0)
+    states = rng.uniform(bounds.lower, bounds.upper, (_STATES, 1, bounds.dimension))
+    for number, each in enumerate(settings.hypotheses.controls.predicates):
+        key = f"hypotheses.controls.predicates[{number}]"
+        predicate = ControlPredicates([each.function()], [each.name])
+        try:
+            predicate.check(system)
+            held = predicate.holds(states, actions[None])
+        except ValueError as error:
+            yield f"{key}: {error}"
+            continue
+        if not held.any():
+            yield (
+                f"{key}: {each.name} forbids none of the {len(actions)} actions in any of "
+                f"{_STATES} random states, so that the tabular model cannot tell; raise "
+                "`actions`, or widen it"
+            )
 
 
 def control_truth_problems(settings: Settings) -> Iterator[str]:

@@ -208,6 +208,7 @@ def _cell_problems(settings: ModelSettings, asked: Mapping[str, tuple[Any, Any]]
     asked = {
         "inference.shapes.count": (settings.inference.shapes.count, 0),
         "hypotheses.controls.ranges": (list(settings.hypotheses.controls.ranges), []),
+        "hypotheses.controls.predicates": (list(settings.hypotheses.controls.predicates), []),
         "hypotheses.controls.shares": (list(settings.hypotheses.controls.shares), []),
         **asked,
     }

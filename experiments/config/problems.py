@@ -11,7 +11,12 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from experiments.config.settings import ShapeSettings, SystemSettings, system_class
+from experiments.config.settings import (
+    PredicateSettings,
+    ShapeSettings,
+    SystemSettings,
+    system_class,
+)
 from experiments.config.settings.kinds import LIST, ONE, WORD
 from experiments.config.suggestions import did_you_mean
 from experiments.tracking.own_modules import put_on_path
@@ -87,12 +92,15 @@ def _targets(tree: Any) -> Iterator[str]:
             yield from _targets(part)
 
 
+_MADE = SystemSettings, ShapeSettings, PredicateSettings  # what `_target_` names makes them
+
+
 def field_keys(kind: Any, prefix: str = "") -> list[str]:
     """Dotted names of a dataclass's fields, and of the fields of those that hold dataclasses."""
     keys = []
     for name, hint in typing.get_type_hints(kind).items():
         keys.append(prefix + name)
-        if (group := _group(hint)) and group not in (SystemSettings, ShapeSettings):
+        if (group := _group(hint)) and group not in _MADE:
             keys += field_keys(group, f"{prefix}{name}.")
     return keys
 

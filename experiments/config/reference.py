@@ -57,7 +57,7 @@ def schema(command: str) -> dict[str, Any]:
     tree = TypeAdapter(COMMANDS[command]).json_schema(schema_generator=_WithMultiplesOfPi)
     for node in (tree, *tree["$defs"].values()):
         node.pop("required", None)
-    for kind in ("SystemSettings", "ShapeSettings"):
+    for kind in ("SystemSettings", "ShapeSettings", "PredicateSettings"):
         if content := tree["$defs"].get(kind):
             target = {**content["properties"]["target"], "title": "Target"}
             tree["$defs"][kind] = {

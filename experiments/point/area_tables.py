@@ -78,8 +78,7 @@ def area_tables(settings: Settings, point: PointInference) -> dict[str, pd.DataF
     if by_shapes is not None and by_size:
         there = sorted(set(asked.demonstrations) & set(by_size))
         for size, method, row in by_shapes.chosen(there):
-            opening = {"demonstrations": size, "subset": 0, "method": method}
-            rows.append({**opening, "expected": np.nan, **row})
+            rows.append({"demonstrations": size, "subset": 0, "method": method, **row})
     of_cells = {"hypothesis": np.arange(len(cells)), "in_truth": by_cells.in_truth}
     return {"areas": pd.DataFrame(rows), "area_map": pd.DataFrame({**of_cells, **columns})}
 

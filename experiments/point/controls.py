@@ -26,6 +26,7 @@ from experiments.point.forecasts import (
 from experiments.point.stages import system_module
 from experiments.progress import begin
 from experiments.tracking.store import Store
+from mlci.actuation.hypotheses import JoinedHypotheses
 from mlci.actuation.inference import ControlInference, calibrate_controls, infer_controls
 from mlci.actuation.ranges import ControlRanges
 from mlci.demonstrations import Demonstration
@@ -138,23 +139,28 @@ def control_tables(
 
 
 def against_truth(settings: Settings) -> tuple[Bools, Bools]:
-    """(C,) which hypotheses are what is forbidden in truth, and which are a part of it."""
+    """(C,) which hypotheses are what is forbidden in truth, and which are a part of it; predicates
+    are neither."""
     system, truth = settings.model, ranges_of(settings.truth.controls, settings.model)
-    hypotheses, box = settings.hypotheses.controls.hypotheses(system), system.control_box
+    asked, box = settings.hypotheses.controls, system.control_box
+    hypotheses = asked.all_ranges(system)
     low, high = np.maximum(hypotheses.lower, box.lower), np.minimum(hypotheses.upper, box.upper)
     from_, to = np.maximum(truth.lower, box.lower), np.minimum(truth.upper, box.upper)
     inside = np.all((low[:, None] >= from_) & (high[:, None] <= to), axis=-1)
     same = np.all((low[:, None] == from_) & (high[:, None] == to), axis=-1)
-    return np.any(same, axis=1), np.any(inside, axis=1)
+    no_range = np.zeros(len(asked.predicates), dtype=bool)
+    return np.append(np.any(same, axis=1), no_range), np.append(np.any(inside, axis=1), no_range)
 
 
 def control_record(controls: ControlInference) -> dict[str, Any]:
-    """The belief for programs, fit for JSON."""
-    calibration, ranges = controls.calibration, controls.hypotheses
-    assert isinstance(ranges, ControlRanges)
-    ends = {
+    """The belief for programs, fit for JSON; predicates have no ends."""
+    calibration, hypotheses = controls.calibration, controls.hypotheses
+    assert isinstance(hypotheses, JoinedHypotheses)
+    ends = {name: {"lower": None, "upper": None} for name in hypotheses.names} | {
         name: {"lower": list(map(finite, low)), "upper": list(map(finite, high))}
-        for name, low, high in zip(ranges.names, ranges.lower, ranges.upper, strict=True)
+        for part in hypotheses.parts
+        if isinstance(part, ControlRanges)
+        for name, low, high in zip(part.names, part.lower, part.upper, strict=True)
     }
     return {
         "none": controls.ranking.posterior_none,
@@ -169,7 +175,12 @@ def control_record(controls: ControlInference) -> dict[str, Any]:
 def _modules(settings: ModelSettings) -> list[ModuleType]:
     """The modules that a map of forecasts of controls depends on."""
     here = sys.modules[__name__]
-    return [mlci.actuation.inference, mlci.demonstrator, system_module(settings.model), here]
+    predicates = [
+        sys.modules[each.target.rpartition(".")[0]]
+        for each in settings.hypotheses.controls.predicates
+    ]
+    system = system_module(settings.model)
+    return [mlci.actuation.inference, mlci.demonstrator, system, here, *predicates]
 
 
 def _fitted(

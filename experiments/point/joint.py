@@ -78,19 +78,19 @@ def joint_tables(
         its region (`true_region`) and its controls (`true_controls`); nan where no pair is.
     """
     truths = true_pairs(settings, regions)
-    known, (of_region, of_controls) = truths.any(), (truths.any(axis=1), truths.any(axis=0))
+    known, of_region, of_controls = truths.any(), np.any(truths, axis=1), np.any(truths, axis=0)
     ranks, rows = settings.ranks, []
     for subsets in random_subsets(len(joint.avoidance), ranks.demonstrations, ranks.subsets, rng):
         for number, subset in enumerate(subsets):
             belief = joint.of_some(subset)
             posterior = belief.posterior
-            i, j = np.unravel_index(np.argmax(posterior), posterior.shape)
+            i, j = map(int, np.unravel_index(np.argmax(posterior), posterior.shape))
             kinds = dict(zip(_COLUMNS.values(), belief.of_kinds.tolist(), strict=True))
             right = {
                 "posterior": np.sum(posterior[truths]),
                 "true_first": truths[i, j],
-                "true_region": of_region[i],
-                "true_controls": of_controls[j],
+                "true_region": np.asarray(of_region)[i],
+                "true_controls": np.asarray(of_controls)[j],
             }
             rows.append(
                 {

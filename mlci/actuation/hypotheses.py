@@ -9,6 +9,7 @@ makes spikes of single controls.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from itertools import product
 from typing import ClassVar
 
@@ -71,6 +72,45 @@ class ControlHypotheses(ABC):
         signs = product(*((-1.0, 1.0) if side else (0.0,) for side in reach.tolist()))
         held = [self.holds(middles, controls + np.array(sign) * reach) for sign in signs]
         return np.asarray(np.any(np.all(held, axis=0), axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class JoinedHypotheses(ControlHypotheses):
+    """Hypotheses of several kinds as one list.
+
+    Attributes:
+        parts: the kinds, in order; their lengths add up to C.
+
+    Raises:
+        ValueError: two of one name.
+    """
+
+    parts: tuple[ControlHypotheses, ...]
+
+    def __post_init__(self) -> None:
+        if len(set(self.names)) < len(self.names):
+            raise ValueError(f"{len(self)} hypotheses need as many names, not {list(self.names)}")
+
+    @property
+    def names(self) -> tuple[str, ...]:  # type: ignore[override]
+        """(C,) those of the parts."""
+        return tuple(name for part in self.parts for name in part.names)
+
+    @property
+    def uses_states(self) -> bool:  # type: ignore[override]
+        """Whether any of them depends on the state."""
+        return any(part.uses_states for part in self.parts if len(part))
+
+    def check(self, system: System) -> None:
+        """See `ControlHypotheses.check`."""
+        for part in self.parts:
+            part.check(system)
+
+    def holds(self, states: Floats, controls: Floats) -> Bools:
+        """See `ControlHypotheses.holds`."""
+        return np.concatenate(
+            [part.holds(states, controls) for part in self.parts if len(part)], axis=-1
+        )
 
 
 def window_pairs(

@@ -100,7 +100,7 @@ class JointInference:
     @property
     def of_kinds(self) -> Floats:
         """(4,) posterior probability of each of `KINDS`."""
-        return np.bincount(self._kind.ravel(), self.posterior.ravel(), minlength=4)
+        return np.array([np.sum(self.posterior[self._kind == k]) for k in range(len(KINDS))])
 
     @property
     def of_regions(self) -> Floats:

@@ -65,7 +65,7 @@ def section(results: Results) -> str:
 
 
 def _joint(results: Results, cases: pd.DataFrame) -> str:
-    """Whether it is told that a region, a range or both are forbidden; nothing where nobody asks."""
+    """Whether it is told that a region, a range or both are forbidden."""
     columns = [f"{name}{end}" for name in _JOINT for end in ("", "_low", "_high")]
     try:
         curve = results.table(STUDY, "joint_curve", ("truth", "demonstrations", *columns))
@@ -78,11 +78,11 @@ def _joint(results: Results, cases: pd.DataFrame) -> str:
         if row["demonstrations"] in _SIZES
     ]
     return (
-        "\nRegions and ranges may also compete in *one* belief, as nothing, a region alone, a range "
-        "alone, or both: moves into the region and moves that apply the range are then left out of "
-        "one distribution a task. Columns are mean posterior probabilities, and the share of sets "
-        "in which the most probable answer is all of the truth; a region inside of the true one "
-        "counts. The model's chances are not calibrated for pairs.\n\n"
+        "\nRegions and ranges may also compete in *one* belief, as nothing, a region alone, a "
+        "range alone, or both: moves into the region and moves that apply the range are then left "
+        "out of one distribution a task. Columns are mean posterior probabilities, and the share "
+        "of sets in which the most probable answer is all of the truth; a region inside of the "
+        "true one counts. The model's chances are not calibrated for pairs.\n\n"
         + table(["u, in " + UNIT, "demonstrations", *_JOINT.values()], lines, words=2)
     )
 

@@ -4,6 +4,7 @@ from experiments.config.settings.advice import AdviceSettings
 from experiments.config.settings.areas import AreaSettings
 from experiments.config.settings.baselines import BaselineSettings
 from experiments.config.settings.cells import GridSettings, TransitionSettings
+from experiments.config.settings.control_predicates import PredicateSettings
 from experiments.config.settings.controls import ControlHypothesesSettings, ControlRange
 from experiments.config.settings.dynamics import DynamicsSettings
 from experiments.config.settings.kinds import ESTIMATE
@@ -57,6 +58,7 @@ __all__ = [
     "ModelSettings",
     "ModelsSettings",
     "NextTaskSettings",
+    "PredicateSettings",
     "RankSettings",
     "RealitySettings",
     "RecordedSettings",

@@ -6,9 +6,13 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
+from pydantic import BeforeValidator
 from pydantic.dataclasses import dataclass
 
+from experiments.config.settings.control_predicates import PredicateSettings, read_predicate
 from experiments.config.settings.kinds import STRICT, Number, Probability, Share, about
+from mlci.actuation.hypotheses import JoinedHypotheses
+from mlci.actuation.predicates import ControlPredicates
 from mlci.actuation.ranges import ControlRanges
 from mlci.spaces import Floats
 from mlci.systems import System
@@ -47,6 +51,13 @@ class ControlHypothesesSettings:
             "of the control",
         ),
     ]
+    predicates: Annotated[
+        tuple[Annotated[PredicateSettings, BeforeValidator(read_predicate)], ...],
+        about(
+            "and functions of states and controls of your own: `_target_` names a function that "
+            "returns one and takes the other keys"
+        ),
+    ]
     shares: Annotated[
         tuple[Probability, ...],
         about(
@@ -74,10 +85,20 @@ class ControlHypothesesSettings:
     @property
     def is_asked(self) -> bool:
         """Whether there are hypotheses about controls."""
-        return bool(self.ranges or self.shares)
+        return bool(self.ranges or self.shares or self.predicates)
 
-    def hypotheses(self, system: System) -> ControlRanges:
-        """The hypotheses: the ranges, then those of shares.
+    def hypotheses(self, system: System) -> JoinedHypotheses:
+        """The hypotheses: the ranges, those of shares, then the predicates.
+
+        Raises:
+            ValueError: two that are the same.
+        """
+        functions = [each.function() for each in self.predicates]
+        names = tuple(each.name for each in self.predicates)
+        return JoinedHypotheses((self.all_ranges(system), ControlPredicates(functions, names)))
+
+    def all_ranges(self, system: System) -> ControlRanges:
+        """Those hypotheses that are ranges: the listed ones, then those of shares.
 
         Raises:
             ValueError: two that are the same.

@@ -110,7 +110,7 @@ def test_what_cannot_be_is_refused(word: str, message: str) -> None:
 
 
 def test_a_range_may_be_named_by_its_share_or_its_ends_but_once() -> None:
-    with pytest.raises(ConfigError, match="name each range once, by ranges or by shares"):
+    with pytest.raises(ConfigError, match="name each once, by ranges, by shares or by pred"):
         settings_of(ranges(RANGES, "1 null"), "hypotheses.controls.shares=[0.5]")
 
 
