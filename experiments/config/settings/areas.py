@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic.dataclasses import dataclass
 
+from experiments.config.settings.cells import Shape
 from experiments.config.settings.kinds import STRICT, CountOrNone, NotNegative, Number, about
-from experiments.config.settings.parts import Shape
 
 
 @dataclass(frozen=True, config=STRICT)

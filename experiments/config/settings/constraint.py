@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic.dataclasses import dataclass
 
+from experiments.config.settings.cells import Shape
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
@@ -13,7 +14,6 @@ from experiments.config.settings.kinds import (
     Positive,
     about,
 )
-from experiments.config.settings.parts import Shape
 
 
 @dataclass(frozen=True, config=STRICT)
