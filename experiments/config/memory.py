@@ -43,7 +43,7 @@ def resolution_memory(settings: Settings) -> float:
     asked = settings.resolution
     if not asked.counts:
         return 0.0
-    largest = max((*asked.counts, *(asked.varying or ())))
+    largest = max(max(asked.counts_of(kind)) for kind in asked.kinds)
     compared = _of_cells(settings, largest, RESOLUTION_SAMPLES, keeps=False)
     return max(compared, _of_cells(settings, asked.finest, 1, keeps=False))
 

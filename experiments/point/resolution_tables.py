@@ -82,7 +82,7 @@ def resolution_table(settings: Settings, point: PointInference) -> pd.DataFrame:
         limit = np.array([_phi(way) for way in _ways(finest, tasks)])
     rows = []
     for kind in asked.kinds:
-        for count in _counts(settings, kind):
+        for count in asked.counts_of(kind):
             model = _KINDS[kind](base, tasks, count)
             if model is None:
                 continue
@@ -102,14 +102,6 @@ def resolution_table(settings: Settings, point: PointInference) -> pd.DataFrame:
                     }
                 )
     return pd.DataFrame(rows, columns=COLUMNS)
-
-
-def _counts(settings: Settings, kind: str) -> tuple[int, ...]:
-    """Numbers of cells of a kind."""
-    asked = settings.resolution
-    if kind in (VARYING, OF_TASK) and asked.varying is not None:
-        return asked.varying
-    return asked.counts
 
 
 def _scaled(grid: Grid, count: int) -> Grid:

@@ -181,3 +181,19 @@ def test_the_command_prints_its_table_and_its_status(tmp_path: Path) -> None:
     assert "recommended     none: raise budget, add larger dts or grids" in done.stdout
     assert "rejected" in done.stdout
     assert not list(tmp_path.iterdir())
+
+
+def test_cells_of_the_tasks_own_are_compared_with_sampled_paths() -> None:
+    """Finer cells come nearer; with as many as there are they are the recommended ones."""
+    words = ("grids=[[10,10]]", "dts=[0.5]", "pairs=4", "hypotheses.shape=[5,5]")
+    _, lines = advice(*words, "grid=adaptive", "grid.refined=400")
+    text = " ".join(" ".join(lines).split())
+    own = float(
+        text.split("grid.refined=400: cells of the task's own differ from these paths by ")[
+            1
+        ].split()[0]
+    )
+    equal = float(text.split("cells differ from them by ")[1].split()[0])
+    assert own < equal
+    with pytest.raises(ConfigError, match=r"grid\.refined: 50 is less than the 100 cells"):
+        settings("grid=adaptive", "grid.refined=50")

@@ -27,6 +27,7 @@ class ResolutionSettings:
         tuple[Count, ...] | None,
         about("numbers of cells of varying size; null is those of `counts`"),
     ]
+    most: Annotated[Count, about("larger numbers of cells are lowered to this")]
     kinds: Annotated[
         Annotated[tuple[CellKind, ...], Field(min_length=1)],
         about("kinds of cells that are compared"),
@@ -40,3 +41,9 @@ class ResolutionSettings:
             "without"
         ),
     ]
+
+    def counts_of(self, kind: str) -> tuple[int, ...]:
+        """Numbers of cells of a kind."""
+        varies = kind in ("varying", "of each task")
+        counts = self.counts if self.varying is None or not varies else self.varying
+        return tuple(dict.fromkeys(min(count, self.most) for count in counts))

@@ -13,14 +13,15 @@ from experiments.infer import infer
 from experiments.point.stages import formed_model
 from mlci.cells.refined_model import RefinedModel
 
-REFINED = (*TINY, "grid.shape=[6,6]", "grid.refined=60")
+SHARED = (*TINY, "grid.shape=[6,6]", "transition.samples=2")
+REFINED = (*SHARED, "grid.refined=60")
 _OF_POINTS = ("seed", "horizon", "truth", "rollouts", "misfit", "demonstrations", "safety", "ranks")
 
 
 def test_a_refined_point_has_the_tables_of_one_with_equal_cells(tmp_path: Path) -> None:
     points = [
         computed(read_config(composed(*words, "misfit=9"))[0], tmp_path)
-        for words in (REFINED, (*TINY, "grid.shape=[6,6]"))
+        for words in (REFINED, SHARED)
     ]
     refined, equal = (
         {path.stem: pd.read_csv(path) for path in point.folder.rglob("*.csv")} for point in points

@@ -98,6 +98,33 @@ def test_how_errors_fall_with_cells(tmp_path: Path) -> None:
     assert text.count("is missed") == 1
 
 
+def test_errors_in_four_dimensions_without_the_errors_of_samples(tmp_path: Path) -> None:
+    """Two tasks that err by 3 and 4 noises, of which one is taken off: sqrt((8 + 15) / 2)."""
+    rows = [
+        {"seed": 0, "kind": kind, "count": count, "task": task, "possible": True}
+        | {
+            "error": (3 + task) * noise,
+            "noise": noise,
+            "trusted": True,
+            "error_of_cells": float("nan"),
+        }
+        for kind, counts in (("averaged", (10_000, 300_000)), ("of each task", (12_000,)))
+        for count in counts
+        for task in (0, 1)
+        for noise in (0.02 if count == 10_000 else 0.01,)
+    ]
+    text = section_cells.telescope_section(
+        results(tmp_path, "cells_telescope", {"resolution": pd.DataFrame(rows)})
+    )
+    assert (
+        "12000 cells, varying, for each task alone, err by 0.0339 [0.0283, 0.0387], 300000" in text
+    )
+    assert text.count("is met") == 1
+    assert "10000: 0.0678 [" in text
+    assert "very many equal cells" not in text.split("Error against")[1]
+    assert "equal, multilinear |" not in text
+
+
 def test_transfer_of_points_that_are_of_no_case_is_missing(tmp_path: Path) -> None:
     tables = transfer_tables()
     some = results(tmp_path, "transfer", {**tables, "cases": tables["cases"][:1]})
