@@ -72,8 +72,8 @@ class SuccessRule:
     def _numbers(self, known: Outlook) -> Floats:
         """(H, F) the rule's features of each such region."""
         columns = [FEATURES.index(name) for name in self.features]
-        told = known.touched >= LEAST_TOUCHED
-        return known.features(self.demonstrations)[told][:, columns]
+        told = np.flatnonzero(known.touched >= LEAST_TOUCHED)
+        return known.features(told, self.demonstrations, self.top)[:, columns]
 
 
 def read_rule(path: Path = KEPT) -> SuccessRule:

@@ -34,8 +34,8 @@ FEATURES = {
     "unreachable": "goals out of reach",
     "forecast_error": "forecast error",
     "touched": "tasks that the truth touches",
-    "rivals": "rivals expected to survive",
     "expected_violations": "expected violations",
+    "simulated": "simulated success",
 }
 _ASIDE = 0.16  # of a row, that its two marks are apart
 

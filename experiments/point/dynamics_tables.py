@@ -13,13 +13,13 @@ import mlci.demonstrator
 from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
 from experiments.point.measures import Measures
-from experiments.point.stages import system_module
+from experiments.point.stages import model_inputs, shape_modules, system_module
 from experiments.point.trials import nominal_skill
 from experiments.tracking.store import Store
 from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.demonstrator import Outcome, demonstrate, sample_trials
 from mlci.outlook.outlook import FEATURES, outlook
-from mlci.spaces import Box
+from mlci.spaces import Box, Floats, Ints
 
 _SEED = (1 << 32) + 1  # more than a study can have, and not that of `forecasts`
 
@@ -46,13 +46,10 @@ def dynamics_table(
         of goals that the tabular agent cannot reach.
     """
     paths = unconstrained_paths(settings, store)
-    covered = point.inference.hypotheses.inside(settings.constraint)
+    covered = np.flatnonzero(point.inference.hypotheses.inside(settings.constraint))
     features = np.full(len(FEATURES), np.nan)
-    if covered.any() and paths:
-        known = outlook(point.tabular, paths, point.hypotheses)
-        numbers = np.flatnonzero(covered)
-        truth = numbers[np.argmax(known.crossed[numbers])]
-        features = known.features(settings.ranks.demonstrations)[truth]
+    if len(covered) and paths:
+        features = _features(settings, point, covered, paths, store)
     seen = ranks[ranks["demonstrations"] == ranks["demonstrations"].max()]
     row = {
         "system": type(settings.model).__name__,
@@ -67,6 +64,34 @@ def dynamics_table(
         "out_of_reach": float(np.mean(~point.inference.reachable)),
     }
     return pd.DataFrame([row])
+
+
+def _features(
+    settings: Settings,
+    point: PointInference,
+    covered: Ints,
+    paths: list[Demonstration],
+    store: Store,
+) -> Floats:
+    """(F,) numbers of that covered hypothesis which is crossed most; all seeds share them."""
+
+    def compute() -> dict[str, np.ndarray]:
+        known, ranks = outlook(point.tabular, paths, point.hypotheses), settings.ranks
+        truth = covered[np.argmax(known.crossed[covered])]
+        return {"features": known.features([truth], ranks.demonstrations, ranks.top)[0]}
+
+    regions = settings.candidates
+    inputs = [
+        model_inputs(settings, regions),
+        path_inputs(settings),
+        covered.tolist(),
+        settings.ranks.demonstrations,
+        settings.ranks.top,
+    ]
+    modules = [mlci.demonstrator, system_module(settings.model), sys.modules[__name__]]
+    modules += shape_modules(settings, regions)
+    features: Floats = store.get("features", inputs, modules, compute)["features"]
+    return features
 
 
 def path_inputs(settings: Settings) -> tuple[Any, ...]:

@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose
-from mlci.evidence import DEFAULT_MODEL_ERROR
-from mlci.maxent import TrajectoryDistribution
+from mlci.evidence import DEFAULT_MODEL_ERROR, rank_scores
+from mlci.outlook.detours import Detours, tabular_detours
 from mlci.outlook.flow import control_reach, flow_expansion
+from mlci.preparation import prepare
 from mlci.regions import as_mask
-from mlci.spaces import Bools, Box, Floats
+from mlci.spaces import Bools, Box, Floats, Ints
 from mlci.tabular import TabularModel
 
 # What success may be predicted by; `Outlook.features` has a number for each.
@@ -26,9 +27,11 @@ FEATURES = (
     "unreachable",
     "forecast_error",
     "touched",
-    "rivals",
     "expected_violations",
+    "simulated",
 )
+_STUDIES = 200  # that are simulated of a truth
+_TWO_OF_100 = 0.02  # added to shares whose log odds are taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +45,11 @@ class Outlook:
             `flow_expansion`.
         reachable: (P,) whether the tabular agent reaches a task's goal.
         entered: (P, C) whether the optimum of a task without a constraint enters a region.
-        phi: (P, C) Phi, 0 where the goal is out of reach.
+        ends: (P, C) whether it begins or ends there, so that nobody can do the task if the region
+            is forbidden.
+        phi: (P, C) Phi as `mlci.infer` takes it, between states; 0 where it says nothing, as where
+            the goal is out of reach.
+        detours: what else is crossed on the way round a region.
     """
 
     diagnosis: Diagnosis
@@ -50,7 +57,9 @@ class Outlook:
     expansion: float
     reachable: Bools
     entered: Bools
+    ends: Bools
     phi: Floats
+    detours: Detours
 
     @property
     def touched(self) -> Floats:
@@ -71,29 +80,42 @@ class Outlook:
         off = np.sum(np.abs(self.phi - self.entered), axis=1)[self.reachable]
         return float(np.mean(off) / max(np.mean(np.sum(self.entered, axis=1)), 1.0))
 
-    def rivals(self, demonstrations: int) -> Floats:
-        """(C,) regions that are expected to be ranked before region i, were it the truth.
+    def simulated_success(self, truth: int, demonstrations: int, top: int) -> float:
+        """Share of simulated studies that rank a region among the first, were it the truth.
 
-        A region is, if its evidence is at least as large in these tasks, and no demonstration
-        enters it. Who does a task whose optimum keeps out of the truth is taken to do it optimally,
-        and who must go round the truth to keep out of the other too. So a region survives so many
-        demonstrations with probability (1 - q)^demonstrations, where q is the share of the tasks
-        whose optimum enters it and not the truth.
-        """
-        evidence = np.mean(-np.log1p((DEFAULT_MODEL_ERROR - 1) * self.phi), axis=0)
-        without = (~self.entered).T.astype(float) @ self.entered / len(self.entered)  # (truth, r)
-        before = evidence >= evidence[:, None]
-        np.fill_diagonal(before, val=False)
-        return np.asarray(np.sum(before * (1 - without) ** demonstrations, axis=1))
-
-    def features(self, demonstrations: int) -> Floats:
-        """(C, F) the numbers of FEATURES, were region i the truth.
-
-        What has a scale is taken by its logarithm, that of a little more where it may be 0.
+        A study has so many tasks, drawn from those that neither begin nor end in the truth, and
+        ranks by evidence as `mlci.infer` does. Who does a task whose optimum keeps out of the truth
+        is taken to do it optimally, and who must go round it to do so as `detours` say.
 
         Args:
-            demonstrations: how many are to be seen.
+            truth: number of the region.
+            demonstrations: of a study.
+            top: it succeeds if the truth is among so many.
         """
+        can_be_done = ~self.ends[:, truth]
+        if not can_be_done.any():
+            return 0.0
+        evidence = -np.log1p((DEFAULT_MODEL_ERROR - 1) * self.phi)
+        round_it = np.flatnonzero(self.entered[:, truth] & can_be_done)
+        crossed = self.entered.copy()
+        crossed[round_it] = self.detours(truth, round_it)
+        shares = can_be_done / np.sum(can_be_done)
+        times = np.random.default_rng(0).multinomial(demonstrations, shares, size=_STUDIES)
+        feasible = times @ crossed.astype(float) == 0
+        return float(np.mean(rank_scores(times @ evidence, feasible)[:, truth] <= top))
+
+    def features(self, regions: ArrayLike, demonstrations: int, top: int) -> Floats:
+        """(B, F) the numbers of FEATURES, were each of some regions the truth.
+
+        What has a scale is taken by its logarithm, that of a little more where it may be 0, and the
+        share of simulated studies by its log odds.
+
+        Args:
+            regions: (B,) their numbers.
+            demonstrations: how many are to be seen.
+            top: success is that the truth is among so many.
+        """
+        numbers: Ints = np.asarray(regions, dtype=np.int64)
         whole = [
             max(self.diagnosis.frozen),
             np.log(self.diagnosis.cells_crossed),
@@ -102,10 +124,14 @@ class Outlook:
             float(np.mean(~self.reachable)),
             self.forecast_error,
         ]
-        rivals = np.log1p(self.rivals(demonstrations))
-        expected = np.log(0.1 + demonstrations * self.crossed)
-        shared = np.tile(whole, (len(self.touched), 1))
-        return np.column_stack([shared, self.touched, rivals, expected])
+        shared = np.tile(whole, (len(numbers), 1))
+        expected = np.log(0.1 + demonstrations * self.crossed[numbers])
+        simulated = [
+            self.simulated_success(number, demonstrations, top) for number in numbers.tolist()
+        ]
+        success = np.array(simulated) + _TWO_OF_100
+        odds = np.log(success / (1 + 2 * _TWO_OF_100 - success))
+        return np.column_stack([shared, self.touched[numbers], expected, odds])
 
 
 def outlook(
@@ -124,20 +150,24 @@ def outlook(
     if not paths:
         raise ValueError("an outlook needs the optimal path of a task at least")
     mask = as_mask(hypotheses, len(model.regions))
-    phi = np.zeros((len(paths), int(np.sum(mask))))
-    reachable = np.zeros(len(paths), dtype=bool)
-    for number, path in enumerate(paths):
-        distribution = TrajectoryDistribution.of_task(model, path.task)
-        reachable[number] = distribution.is_possible
-        if distribution.is_possible:
-            phi[number] = distribution.violation_probabilities()[mask]
-    entered = np.array([model.regions.violated_by(path.states)[mask] for path in paths])
+    tasks = [path.task for path in paths]
+    prepared = prepare(model, tasks, hypotheses=mask)
+    entered, begins, stops = (
+        np.array([model.regions.violated_by(states)[mask] for states in each])
+        for each in (
+            [path.states for path in paths],
+            [path.states[:1] for path in paths],
+            [path.states[-1:] for path in paths],
+        )
+    )
     actions = Box(model.actions.min(axis=0), model.actions.max(axis=0))
     return Outlook(
         diagnosis=diagnose(model),
         reach=control_reach(model.system, model.equal_cells, actions, model.dt),
         expansion=float(np.mean([flow_expansion(model.system, path) for path in paths])),
-        reachable=reachable,
+        reachable=prepared.reachable,
         entered=entered,
-        phi=phi,
+        ends=begins | stops,
+        phi=np.where(prepared.decided_by_cell, 0.0, 1 - prepared.avoidance),
+        detours=tabular_detours(model, tasks, mask),
     )

@@ -23,7 +23,9 @@ KNOWN = Outlook(
     expansion=0.5,
     reachable=np.array([True, True, True, False]),
     entered=np.array([[1, 0, 0], [0, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=bool),
+    ends=np.zeros((4, 3), dtype=bool),
     phi=np.array([[0.9, 0.1, 0.0], [0.1, 0.0, 0.0], [0.8, 0.7, 0.0], [0.0, 0.0, 0.0]]),
+    detours=lambda truth, tasks: np.zeros((len(tasks), 3), dtype=bool),
 )
 
 
@@ -45,7 +47,7 @@ def test_what_is_kept_says_what_the_tables_say(study: Path, tmp_path: Path) -> N
     assert rule.features == tuple(table["feature"][:-1])
     assert (rule.top, rule.demonstrations, rule.systems, rule.points) == (5, 9, 5, 40)
     columns = [FEATURES.index(name) for name in rule.features]
-    numbers = KNOWN.features(9)[:2][:, columns]  # no task would enter the third region
+    numbers = KNOWN.features([0, 1], 9, 5)[:, columns]  # no task would enter the third region
     z = (numbers - table["mean"][:-1].to_numpy()) / table["scale"][:-1].to_numpy()
     logits = table["weight"].iloc[-1] + z @ table["weight"][:-1].to_numpy()
     np.testing.assert_allclose(rule.chances(KNOWN), 1 / (1 + np.exp(-logits)), atol=1e-5)

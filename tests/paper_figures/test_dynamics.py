@@ -28,7 +28,7 @@ def test_the_figure_has_a_row_for_each_system_way_and_number() -> None:
     ways = [label.get_text().replace("\n", " ") for label in scores.get_yticklabels()]
     assert ways == [*figure_module.WAYS.values()]
     names = [label.get_text().replace("\n", " ") for label in weights.get_yticklabels()]
-    assert names[:2] == ["expected violations", "reach of controls in a step"]
+    assert names[:2] == ["simulated success", "reach of controls in a step"]
     plt.close(figure)
     row = MADE["success_scores"].set_index("way").loc["base_rate"]
     assert f"base rate: Brier score {row['brier']:.3f}; the rule's less this " in (

@@ -47,7 +47,7 @@ def test_the_row_is_the_outlook_of_the_truth_and_its_ranks(store: Store) -> None
     model = discretize(
         settings.model, settings.cells, settings.action_values, settings.dt, settings.candidates
     )
-    expected = outlook(model, paths).features(3)[54]
+    (expected,) = outlook(model, paths).features([54], 3, 5)
     np.testing.assert_allclose([row[name] for name in FEATURES], expected)
     ranks = tables["ranks"].query("demonstrations == 3")
     assert row["demonstrations"] == 3
@@ -108,7 +108,7 @@ def test_no_demonstration_has_a_part_in_what_is_known_before() -> None:
 
 def test_the_studys_truths_are_those_that_are_drawn(store: Store) -> None:
     settings: Settings = read_config(
-        composed(*WORDS, "experiment=dynamics", "system=damped_spring")
+        composed(*WORDS, "experiment=dynamics", "system=damped_spring", "dynamics.tasks=40")
     )[0]
     drawn = drawn_truths(settings, store, 5)
     text = (CONF / "experiment" / "dynamics.yaml").read_text()

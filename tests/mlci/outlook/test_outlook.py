@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from mlci.demonstrator import demonstrate, sample_trials
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
+from mlci.outlook.detours import tabular_detours
 from mlci.outlook.outlook import FEATURES, Outlook, outlook
 from mlci.regions import Regions
 from mlci.spaces import Box
@@ -19,6 +21,16 @@ from mlci.tabular import action_grid, discretize
 
 SYSTEM = DoubleIntegrator()
 REGIONS = Regions.from_grid(SYSTEM.space, (6, 3))
+KNOWN = Outlook(
+    diagnosis=Diagnosis(0.0, 0.0, 2.0, (0.1, 0.2)),
+    reach=np.array([1.5, 0.8]),
+    expansion=0.5,
+    reachable=np.ones(4, dtype=bool),
+    entered=np.array([[0, 1, 0], [1, 0, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
+    ends=np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
+    phi=np.array([[0.2, 0.4, 0.1], [0.7, 0.8, 0.3], [0.3, 0.0, 0.6], [1.0, 0.0, 0.0]]),
+    detours=lambda truth, tasks: np.zeros((len(tasks), 3), dtype=bool),
+)
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +49,7 @@ def test_each_number_is_that_of_a_loop(model, paths) -> None:
     known = outlook(model, paths)
     phi = np.zeros((6, len(REGIONS)))
     for j, path in enumerate(paths):
-        distribution = TrajectoryDistribution.of_task(model, path.task)
+        distribution = TrajectoryDistribution.of_task(model, path.task, exact_ends=True)
         assert known.reachable[j] == distribution.is_possible
         if distribution.is_possible:
             phi[j] = distribution.violation_probabilities()
@@ -48,7 +60,7 @@ def test_each_number_is_that_of_a_loop(model, paths) -> None:
         ]
     )
     assert known.reachable.any()
-    features = dict(zip(FEATURES, known.features(4).T, strict=True))
+    features = dict(zip(FEATURES, known.features(np.arange(18), 4, 3).T, strict=True))
     np.testing.assert_allclose(features["touched"], entered.mean(axis=0))
     np.testing.assert_allclose(np.exp(features["expected_violations"]), 0.1 + 4 * phi.mean(axis=0))
     diagnosis = diagnose(model)
@@ -57,29 +69,60 @@ def test_each_number_is_that_of_a_loop(model, paths) -> None:
     assert set(features["unreachable"]) == {np.mean(~known.reachable)}
     off = np.abs(phi - entered).sum(axis=1)[known.reachable].mean()
     np.testing.assert_allclose(features["forecast_error"], off / entered.sum(axis=1).mean())
-    evidence = np.mean(-np.log(0.1 + 0.9 * (1 - phi)), axis=0)
-    for i in range(18):
-        rivals = 0.0
-        for k in range(18):
-            if k != i and evidence[k] >= evidence[i]:
-                telling = sum(entered[j, k] and not entered[j, i] for j in range(6)) / 6
-                rivals += (1 - telling) ** 4
-        assert features["rivals"][i] == pytest.approx(np.log(1 + rivals), abs=1e-12)
+
+
+def test_a_simulated_study_is_ranked_as_demonstrations_would_be() -> None:
+    """All ways to draw two of three tasks, by loops; the fourth task begins in the truth."""
+    known = replace(KNOWN, detours=lambda truth, tasks: np.array([[0, 0, 1]] * len(tasks)) > 0)
+    crossed = [[0, 1, 0], [0, 0, 1], [0, 0, 0]]  # the second task has to go round the first region
+    succeeded = []
+    for pair in itertools.product(range(3), repeat=2):
+        gain = np.zeros(3)
+        for task in pair:
+            for region in range(3):
+                seen = -np.log(0.1 + 0.9 * (1 - known.phi[task, region]))
+                gain[region] += -np.inf if crossed[task][region] else seen
+        succeeded.append(gain[0] >= max(gain[1:]))
+    share = np.mean(succeeded)
+    assert 0.3 < share < 0.9
+    error = 4 * np.sqrt(share * (1 - share) / 200)
+    assert known.simulated_success(0, 2, 1) == pytest.approx(share, abs=error)
+    assert known.simulated_success(0, 2, 3) == 1
+    assert replace(known, ends=np.ones((4, 3), dtype=bool)).simulated_success(0, 2, 3) == 0
+
+
+def test_a_detour_is_the_best_tabular_way_that_avoids_the_region(model, paths) -> None:
+    every = np.ones(len(REGIONS), dtype=bool)
+    tasks = [path.task for path in paths]
+    detours = tabular_detours(model, tasks, every)
+    phi = outlook(model, paths).phi
+    task, region = np.argwhere((phi > 0.3) & (phi < 0.9))[0].tolist()
+    (crossed,) = detours(region, np.array([task]))
+    assert not crossed[region]
+    assert crossed.any()
+    under = model.under(np.arange(len(REGIONS)) == region)
+    distribution = TrajectoryDistribution.of_task(under, tasks[task])
+    cells, moves = distribution.sample(3000, np.random.default_rng(1))
+    rewards = model.policy_moves(np.arange(model.states))[1][cells[:, :-1], moves].sum(axis=1)
+    best = np.argmax(rewards)
+    ways = model.crossed(cells[[best], :-1], moves[[best]])[0]
+    assert np.mean(ways == crossed) > 0.8
+    some = tabular_detours(model, tasks, np.arange(18) != (region + 1) % 18)
+    assert some(region - (region == 17), np.array([task])).shape == (1, 17)
 
 
 def test_forecasts_of_tasks_out_of_reach_are_no_errors() -> None:
     entered = np.array([[1, 0, 0], [1, 1, 0], [0, 1, 1]], dtype=bool)
     phi = np.array([[0.9, 0.1, 0.0], [0.8, 0.7, 0.0], [0.0, 0.0, 0.0]])
+    ends = np.zeros((3, 3), dtype=bool)
     known = Outlook(
         *(Diagnosis(0.0, 0.0, 2.0, (0.1, 0.2)), np.array([1.5, 0.8]), 0.5),
-        *(np.array([True, True, False]), entered, phi),
+        *(np.array([True, True, False]), entered, ends, phi, KNOWN.detours),
     )
     assert known.forecast_error == pytest.approx((0.2 + 0.5) / 2 / (5 / 3))
     nobody = replace(known, reachable=np.zeros(3, dtype=bool))
     assert nobody.forecast_error == 1
-    assert known.features(2)[0, FEATURES.index("reach")] == np.log(0.8 + 0.01)  # the least
-    # Of the second region's rivals the first is entered without it by a third of the tasks.
-    assert known.rivals(2)[1] == pytest.approx((1 - 1 / 3) ** 2)
+    assert known.features([0], 2, 1)[0, FEATURES.index("reach")] == np.log(0.8 + 0.01)  # the least
 
 
 def test_a_mask_takes_the_hypotheses_alone(model, paths) -> None:
