@@ -138,7 +138,7 @@ def _led(
         latest = refit(latest, states, draws.controls, density, passage.limits)
         shares = spread(np.sum(density, axis=0))
         proposal = Proposal.of(latest, shares, _PILOT)
-        across += np.all(near[nearest] == np.inf)
+        across += int(np.all(near[nearest] == np.inf))
         if across == _ACROSS:
             break
     return own.resized(round(_OWN * samples)).joined(Proposal.of(latest, shares, samples))
