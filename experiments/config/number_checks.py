@@ -58,8 +58,12 @@ def count_problems(settings: Settings) -> Iterator[str]:
     yield from _division_problems("demonstrations.dt", demonstrations.dt, settings.horizon)
     for i, step in enumerate(settings.models.steps):
         yield from _division_problems(f"models.steps[{i}]", step, settings.horizon)
-    steps, counts = settings.models.steps, settings.resolution.counts
-    for key, values in (("models.steps", steps), ("resolution.counts", counts)):
+    twice = {
+        "models.steps": settings.models.steps,
+        "resolution.counts": settings.resolution.counts,
+        "soft.weights": settings.soft.weights,
+    }
+    for key, values in twice.items():
         if len(set(values)) < len(values):
             yield f"{key}: {list(values)} holds a value twice; give each once"
 

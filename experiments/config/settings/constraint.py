@@ -9,8 +9,8 @@ from pydantic.dataclasses import dataclass
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
-    NotNegative,
     Positive,
+    Weight,
     about,
 )
 from experiments.config.settings.parts import Shape
@@ -29,7 +29,7 @@ class SoftSettings:
     ]
     demonstrations: Annotated[Shape, about("so many demonstrations are in each set")]
     weights: Annotated[
-        tuple[NotNegative, ...],
+        tuple[Weight, ...],
         about("costs of the time inside the truth; none asks nothing", "nat/s"),
     ]
 

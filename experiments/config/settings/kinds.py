@@ -47,6 +47,7 @@ _READ = BeforeValidator(read_number)
 Number = Annotated[float, _READ]
 Positive = Annotated[float, Field(gt=0), _READ]
 NotNegative = Annotated[float, Field(ge=0), _READ]
+Weight = Annotated[float, Field(ge=0, le=1e6), _READ]  # [nat/s]; a wall is far below
 SizePower = Annotated[float, Field(ge=0, le=LARGEST_POWER), _READ]
 HalfWidth = Annotated[float, Field(gt=0, le=0.5), _READ]  # share of a range
 Share = Annotated[float, Field(ge=0, lt=1), _READ]
