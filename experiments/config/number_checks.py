@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from experiments.config.memory import expected_memory, machine_memory, trial_memory
@@ -64,14 +64,21 @@ def count_problems(settings: Settings) -> Iterator[str]:
         "soft.weights": settings.soft.weights,
     }
     for key, values in twice.items():
-        if len(set(values)) < len(values):
-            yield f"{key}: {list(values)} holds a value twice; give each once"
+        yield from _repeat_problems(key, values)
+
+
+def _repeat_problems(key: str, values: Sequence[Any]) -> Iterator[str]:
+    """A value that is given twice."""
+    if len(set(values)) < len(values):
+        yield f"{key}: {list(values)} holds a value twice; give each once"
 
 
 def advice_count_problems(settings: AdviceSettings) -> Iterator[str]:
-    """Time steps that do not divide the horizon."""
+    """Time steps that do not divide the horizon, and what is compared with itself."""
     for i, dt in enumerate(settings.dts):
         yield from _division_problems(f"dts[{i}]", dt, settings.horizon)
+    yield from _repeat_problems("dts", settings.dts)
+    yield from _repeat_problems("grids", settings.grids or ())
 
 
 def budget_problems(settings: AdviceSettings) -> Iterator[str]:

@@ -7,7 +7,15 @@ from typing import Annotated
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from experiments.config.settings.kinds import STRICT, Count, Positive, Seed, Tasks, about
+from experiments.config.settings.kinds import (
+    STRICT,
+    Count,
+    Positive,
+    Seed,
+    StartPoints,
+    Tasks,
+    about,
+)
 from experiments.config.settings.parts import GridSettings, Shape, TaskSettings
 from experiments.config.settings.point import SubjectSettings
 from mlci.grids import Grid
@@ -32,7 +40,7 @@ class AdviceSettings(SubjectSettings):
     ]
     budget: Annotated[Count, about("tabular states, at most")]
     remedy: Annotated[
-        Count,
+        StartPoints,
         about(
             "start points in a cell, along each dimension, that are tried where its centre fails"
         ),

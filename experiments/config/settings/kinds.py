@@ -59,6 +59,7 @@ _MOST = 1_000_000  # of trials, rollouts and the like
 Whole = Annotated[int, Field(strict=True)]
 Index = Annotated[int, Field(strict=True, ge=0)]
 Count = Annotated[int, Field(strict=True, ge=1, le=_MOST)]
+StartPoints = Annotated[int, Field(strict=True, ge=1, le=20)]  # along each dimension of a cell
 Tasks = Annotated[int, Field(strict=True, ge=1, le=10_000)]  # each is worked on for some 10 ms
 Restarts = Annotated[int, Field(strict=True, ge=1, le=1000)]  # all are searched from at once
 CountOrNone = Annotated[int, Field(strict=True, ge=0, le=_MOST)]
