@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from experiments.config.memory import (
@@ -63,22 +63,29 @@ def count_problems(settings: Settings) -> Iterator[str]:
     yield from _division_problems("demonstrations.dt", demonstrations.dt, settings.horizon)
     for i, step in enumerate(settings.models.steps):
         yield from _division_problems(f"models.steps[{i}]", step, settings.horizon)
-    asked = settings.resolution
-    lists: dict[str, tuple[Any, ...]] = {
+    twice: dict[str, tuple[Any, ...]] = {
         "models.steps": settings.models.steps,
-        "resolution.counts": asked.counts,
-        "resolution.varying": asked.varying or (),
-        "resolution.kinds": asked.kinds,
+        "resolution.counts": settings.resolution.counts,
+        "resolution.varying": settings.resolution.varying or (),
+        "resolution.kinds": settings.resolution.kinds,
+        "soft.weights": settings.soft.weights,
     }
-    for key, values in lists.items():
-        if len(set(values)) < len(values):
-            yield f"{key}: {list(values)} holds a value twice; give each once"
+    for key, values in twice.items():
+        yield from _repeat_problems(key, values)
+
+
+def _repeat_problems(key: str, values: Sequence[Any]) -> Iterator[str]:
+    """A value that is given twice."""
+    if len(set(values)) < len(values):
+        yield f"{key}: {list(values)} holds a value twice; give each once"
 
 
 def advice_count_problems(settings: AdviceSettings) -> Iterator[str]:
-    """Time steps that do not divide the horizon."""
+    """Time steps that do not divide the horizon, and what is compared with itself."""
     for i, dt in enumerate(settings.dts):
         yield from _division_problems(f"dts[{i}]", dt, settings.horizon)
+    yield from _repeat_problems("dts", settings.dts)
+    yield from _repeat_problems("grids", settings.grids or ())
 
 
 def budget_problems(settings: AdviceSettings) -> Iterator[str]:

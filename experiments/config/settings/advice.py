@@ -8,7 +8,15 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.cells import GridSettings, Shape
-from experiments.config.settings.kinds import STRICT, Count, Positive, Seed, Tasks, about
+from experiments.config.settings.kinds import (
+    STRICT,
+    Count,
+    Positive,
+    Seed,
+    StartPoints,
+    Tasks,
+    about,
+)
 from experiments.config.settings.parts import TaskSettings
 from experiments.config.settings.point import SubjectSettings
 from mlci.grids import Grid
@@ -33,7 +41,7 @@ class AdviceSettings(SubjectSettings):
     ]
     budget: Annotated[Count, about("tabular states, at most")]
     remedy: Annotated[
-        Count,
+        StartPoints,
         about(
             "start points in a cell, along each dimension, that are tried where its centre fails"
         ),

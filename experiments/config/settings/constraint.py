@@ -10,8 +10,8 @@ from experiments.config.settings.cells import Shape
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
-    NotNegative,
     Positive,
+    Weight,
     about,
 )
 
@@ -29,7 +29,7 @@ class SoftSettings:
     ]
     demonstrations: Annotated[Shape, about("so many demonstrations are in each set")]
     weights: Annotated[
-        tuple[NotNegative, ...],
+        tuple[Weight, ...],
         about("costs of the time inside the truth; none asks nothing", "nat/s"),
     ]
 

@@ -47,6 +47,7 @@ _READ = BeforeValidator(read_number)
 Number = Annotated[float, _READ]
 Positive = Annotated[float, Field(gt=0), _READ]
 NotNegative = Annotated[float, Field(ge=0), _READ]
+Weight = Annotated[float, Field(ge=0, le=1e6), _READ]  # [nat/s]; a wall is far below
 SizePower = Annotated[float, Field(ge=0, le=LARGEST_POWER), _READ]
 HalfWidth = Annotated[float, Field(gt=0, le=0.5), _READ]  # share of a range
 Share = Annotated[float, Field(ge=0, lt=1), _READ]
@@ -58,6 +59,7 @@ _MOST = 1_000_000  # of trials, rollouts and the like
 Whole = Annotated[int, Field(strict=True)]
 Index = Annotated[int, Field(strict=True, ge=0)]
 Count = Annotated[int, Field(strict=True, ge=1, le=_MOST)]
+StartPoints = Annotated[int, Field(strict=True, ge=1, le=20)]  # along each dimension of a cell
 Tasks = Annotated[int, Field(strict=True, ge=1, le=10_000)]  # each is worked on for some 10 ms
 Restarts = Annotated[int, Field(strict=True, ge=1, le=1000)]  # all are searched from at once
 CountOrNone = Annotated[int, Field(strict=True, ge=0, le=_MOST)]

@@ -215,6 +215,7 @@ VALUES = [
     ("demonstrations.pairs=1000000", "demonstrations.pairs: 1000000 trials, of 3 first guesses"),
     ("dynamics.tasks=1000000", "dynamics.tasks: 1000000 trials, of 3 first guesses"),
     ("sampled.restarts=1000000", "sampled.restarts: 1000000 must be at most 1000"),
+    ("soft.weights=[1e300]", "soft.weights[0]: 1e+300 must be at most 1000000"),
     ("rollouts=10000000", "rollouts: 10000000 must be at most 1000000"),
     ("transition.samples=0", "transition.samples: 0 must be at least 1"),
     ("inference.prior=1", "inference.prior: 1.0 must be below 1"),

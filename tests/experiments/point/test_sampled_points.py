@@ -151,7 +151,9 @@ def test_what_samples_cannot_be_is_refused(words: str, message: str) -> None:
         read_config(composed("model=sampled", words))
 
 
-@pytest.mark.parametrize("words", ["models.steps=[0.5,0.5]", "resolution.counts=[100,100]"])
+@pytest.mark.parametrize(
+    "words", ["models.steps=[0.5,0.5]", "resolution.counts=[100,100]", "soft.weights=[1.0,1]"]
+)
 def test_what_is_given_twice_is_refused(words: str) -> None:
     with pytest.raises(ConfigError, match="holds a value twice"):
         read_config(composed(words))
