@@ -66,14 +66,16 @@ def ranked(problem: Problem, _rng: np.random.Generator) -> Answer:
     """Regions by the same posterior, of which as many are taken as are true.
 
     Of equally probable ones, as of those that no sampled set holds, that comes first which is the
-    likelier beside the most probable set.
+    likelier beside the most probable set. Where that is the empty one, the likelier comes first in
+    any case: small marginals are mostly the sample's error.
     """
     rates = _rates(problem)
     belief = _belief(problem, rates)
     best = np.isin(np.arange(problem.regions), belief.most_probable())
     beside = set_gains(problem, rates).beside(best) + _prior(problem).log_beside(best)
+    marginal = belief.marginal if np.any(best) else np.zeros(problem.regions)
     scores = np.empty(problem.regions)
-    scores[np.lexsort((beside, belief.marginal))] = np.arange(problem.regions)
+    scores[np.lexsort((beside, marginal))] = np.arange(problem.regions)
     return Answer(np.where(problem.feasible, scores, -np.inf))
 
 

@@ -242,6 +242,12 @@ def test_the_inside_that_nobody_can_enter_is_forbidden_with_its_border() -> None
     assert told.chosen is None
     assert score(case, told, rng)["iou"] == 1
     assert np.all(told.scores[~case.problem.feasible] == -np.inf)
+    few = grid_case(Agent(table, 8, final=table.goals), (5, 5), [], 0, 1)  # which say little
+    first = ranked(few.problem, rng).scores
+    alone = set_gains(few.problem, Rates(NEVER)).beside(np.zeros(25, dtype=bool))
+    assert not np.any(sets(few.problem, rng).chosen)
+    feasible = few.problem.feasible
+    assert np.all(np.diff(alone[feasible][np.argsort(first[feasible])]) >= -1e-12)
 
 
 def test_files_that_are_no_entries_are_told(tmp_path: Path) -> None:
