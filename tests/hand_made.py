@@ -17,7 +17,7 @@ from experiments.tracking.sealed import read_sealed, write_sealed
 CONFIG: dict[str, Any] = {
     "system": {"target": "mlci.systems.DoubleIntegrator", "arguments": {}},
     "truth": {"name": "wall"},
-    "grid": {"shape": [4, 3], "offset": None},
+    "grid": {"shape": [4, 3], "offset": None, "refined": 0},
     "actions": 3,
     "dt": 0.5,
     "transition": {"samples": 1},

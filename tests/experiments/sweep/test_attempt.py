@@ -149,7 +149,7 @@ def summary_row(point: Point) -> dict[str, float | None]:
 def test_record_says_what_a_result_comes_from(point: Point, settings: Settings) -> None:
     attempt.run_here(point, settings, print)
     record = point.record()
-    assert record["config"]["grid"] == {"shape": [12, 8], "offset": None}
+    assert record["config"]["grid"] == {"shape": [12, 8], "offset": None, "refined": 0}
     assert record["summary"] == summary_row(point)
     assert record["summary"]["kept"] == 5
     assert record["summary"]["final_state_error"] > 0

@@ -45,7 +45,7 @@ def test_finished_point_has_a_record_and_its_tables(settings: Settings, tmp_path
             np.testing.assert_array_equal(table[column], frame[column])
     record = json.loads((point.folder / "record.json").read_text())
     assert record["identity"] == point.folder.name
-    assert record["config"]["grid"] == {"shape": [12, 8], "offset": None}
+    assert record["config"]["grid"] == {"shape": [12, 8], "offset": None, "refined": 0}
     assert record["seconds"]["total"] >= 0
     assert record["packages"]["numpy"] == np.__version__
     assert lines
