@@ -29,16 +29,15 @@ from experiments.config.settings.parts import (
     CalibrationSettings,
     DemonstrationSettings,
     GridSettings,
-    HypothesesSettings,
     InferenceSettings,
     NextTaskSettings,
     RankSettings,
     Shape,
     TaskSettings,
     TransitionSettings,
-    TruthSettings,
 )
 from experiments.config.settings.reality import RealitySettings, read_reality
+from experiments.config.settings.regions import HypothesesSettings, TruthSettings
 from experiments.config.settings.resolution import ResolutionSettings
 from experiments.config.settings.safety import SafetySettings
 from experiments.config.settings.sampling import ModelsSettings, SampledSettings
