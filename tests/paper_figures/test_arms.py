@@ -56,7 +56,10 @@ def test_captions_and_section_tell_the_numbers(tmp_path: Path) -> None:
         for name, table in tables.items():
             table.to_csv(folder / f"{name}.csv", index=False)
     text = section_arms.section(Results(tmp_path))
-    assert "it is in 80 % [49, 94 %] of 10, so that the target is met, though the interval" in text
+    assert (
+        "it is in 80 % [49, 94 %] of the 10 that have run, so that the target is met, though"
+        in text
+    )
     assert "| arm, six joints | 10 | 60 % [31, 83 %] | 80 % [49, 94 %] | 1 |" in text
     assert "| 0.5 to 1 | 100 | 0.750 | 0.700" in text
     assert "| samples, 1000 to 4000 | 1.00 | 1.00 |" in text

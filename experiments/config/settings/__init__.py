@@ -9,21 +9,19 @@ from experiments.config.settings.controls import ControlHypothesesSettings, Cont
 from experiments.config.settings.dynamics import DynamicsSettings
 from experiments.config.settings.kinds import ESTIMATE
 from experiments.config.settings.parts import (
-    NO_TRUTH,
     CalibrationSettings,
     DemonstrationSettings,
-    HypothesesSettings,
     InferenceSettings,
     NextTaskSettings,
     RankSettings,
     SetSettings,
     TaskBoxSettings,
     TaskSettings,
-    TruthSettings,
 )
 from experiments.config.settings.point import ModelSettings, Settings, SubjectSettings
 from experiments.config.settings.reality import RealitySettings
 from experiments.config.settings.recorded import RecordedSettings
+from experiments.config.settings.regions import NO_TRUTH, HypothesesSettings, TruthSettings
 from experiments.config.settings.safety import BARRIER, ESCAPES, SafetySettings
 from experiments.config.settings.sampling import ModelsSettings, SampledSettings
 from experiments.config.settings.shapes import (

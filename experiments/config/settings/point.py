@@ -29,14 +29,13 @@ from experiments.config.settings.kinds import (
 from experiments.config.settings.parts import (
     CalibrationSettings,
     DemonstrationSettings,
-    HypothesesSettings,
     InferenceSettings,
     NextTaskSettings,
     RankSettings,
     TaskSettings,
-    TruthSettings,
 )
 from experiments.config.settings.reality import RealitySettings, read_reality
+from experiments.config.settings.regions import HypothesesSettings, TruthSettings
 from experiments.config.settings.resolution import ResolutionSettings
 from experiments.config.settings.safety import SafetySettings
 from experiments.config.settings.sampling import ModelsSettings, SampledSettings

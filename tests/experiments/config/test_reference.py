@@ -53,7 +53,7 @@ def test_tables_have_a_row_for_every_value_with_its_unit_and_default() -> None:
     row = next(line for line in text.splitlines() if line.startswith("| `dt` | "))
     assert row.endswith(" | s | `0.25` | number > 0 |")
     assert "| `safety.method` | " in text
-    assert "| `equation` | `equation` or `escapes` |" in text
+    assert "| `equation` | `equation` or `escapes` or `barrier` |" in text
 
 
 @pytest.mark.parametrize("command", COMMANDS)
