@@ -28,7 +28,7 @@ KNOWN = Outlook(
     reachable=np.ones(4, dtype=bool),
     entered=np.array([[0, 1, 0], [1, 0, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
     ends=np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
-    phi=np.array([[0.2, 0.4, 0.1], [0.7, 0.8, 0.3], [0.3, 0.0, 0.6], [1.0, 0.0, 0.0]]),
+    phi=np.array([[0.2, 0.4, 0.1], [0.7, 0.85, 0.3], [0.3, 0.0, 0.6], [1.0, 0.0, 0.0]]),
     detours=lambda truth, tasks: np.zeros((len(tasks), 3), dtype=bool),
 )
 
