@@ -92,8 +92,8 @@ MLCI = {
     "mlci.outlook.rule": "mlci.spaces",
     "mlci.outlook.flow": "mlci.demonstrations mlci.grids mlci.systems",
     "mlci.outlook.detours": "mlci.maxent",
-    "mlci.outlook.outlook": "mlci.diagnosis mlci.outlook.detours mlci.outlook.flow "
-    "mlci.preparation",
+    "mlci.outlook.outlook": "mlci.diagnosis mlci.maxent mlci.outlook.detours "
+    "mlci.outlook.flow mlci.preparation",
     "mlci.sets.chains": "mlci.spaces",
     "mlci.sets.evidence": "mlci.inference mlci.models",
     "mlci.sets.posterior": "mlci.sets.chains mlci.sets.evidence",

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from mlci.demonstrations import Demonstration
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.evidence import DEFAULT_MODEL_ERROR, rank_scores
+from mlci.maxent import TrajectoryDistribution
 from mlci.outlook.detours import Detours, tabular_detours
 from mlci.outlook.flow import control_reach, flow_expansion
 from mlci.preparation import prepare
@@ -43,7 +44,7 @@ class Outlook:
         reach: (n,) cells that the range of actions spans after a step, see `control_reach`.
         expansion: mean over tasks of the logarithm by which the flow stretches, see
             `flow_expansion`.
-        reachable: (P,) whether the tabular agent reaches a task's goal.
+        reachable: (P,) whether the tabular agent reaches a task's goal, between cells.
         entered: (P, C) whether the optimum of a task without a constraint enters a region.
         ends: (P, C) whether it begins or ends there, so that nobody can do the task if the region
             is forbidden.
@@ -165,7 +166,9 @@ def outlook(
         diagnosis=diagnose(model),
         reach=control_reach(model.system, model.equal_cells, actions, model.dt),
         expansion=float(np.mean([flow_expansion(model.system, path) for path in paths])),
-        reachable=prepared.reachable,
+        reachable=np.array(
+            [TrajectoryDistribution.of_task(model, task).is_possible for task in tasks]
+        ),
         entered=entered,
         ends=begins | stops,
         phi=np.where(prepared.decided_by_cell, 0.0, 1 - prepared.avoidance),

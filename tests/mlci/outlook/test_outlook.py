@@ -28,7 +28,7 @@ KNOWN = Outlook(
     reachable=np.ones(4, dtype=bool),
     entered=np.array([[0, 1, 0], [1, 0, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
     ends=np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
-    phi=np.array([[0.2, 0.4, 0.1], [0.7, 0.8, 0.3], [0.3, 0.0, 0.6], [1.0, 0.0, 0.0]]),
+    phi=np.array([[0.2, 0.4, 0.1], [0.7, 0.85, 0.3], [0.3, 0.0, 0.6], [1.0, 0.0, 0.0]]),
     detours=lambda truth, tasks: np.zeros((len(tasks), 3), dtype=bool),
 )
 
@@ -50,7 +50,8 @@ def test_each_number_is_that_of_a_loop(model, paths) -> None:
     phi = np.zeros((6, len(REGIONS)))
     for j, path in enumerate(paths):
         distribution = TrajectoryDistribution.of_task(model, path.task, exact_ends=True)
-        assert known.reachable[j] == distribution.is_possible
+        between_cells = TrajectoryDistribution.of_task(model, path.task)
+        assert known.reachable[j] == between_cells.is_possible
         if distribution.is_possible:
             phi[j] = distribution.violation_probabilities()
     entered = np.array(
@@ -73,8 +74,8 @@ def test_each_number_is_that_of_a_loop(model, paths) -> None:
 
 def test_a_simulated_study_is_ranked_as_demonstrations_would_be() -> None:
     """All ways to draw two of three tasks, by loops; the fourth task begins in the truth."""
-    known = replace(KNOWN, detours=lambda truth, tasks: np.array([[0, 0, 1]] * len(tasks)) > 0)
-    crossed = [[0, 1, 0], [0, 0, 1], [0, 0, 0]]  # the second task has to go round the first region
+    known = replace(KNOWN, detours=lambda truth, tasks: np.array([[0, 1, 0]] * len(tasks)) > 0)
+    crossed = [[0, 1, 0], [0, 1, 0], [0, 0, 0]]  # the second task has to go round the first region
     succeeded = []
     for pair in itertools.product(range(3), repeat=2):
         gain = np.zeros(3)
@@ -85,7 +86,7 @@ def test_a_simulated_study_is_ranked_as_demonstrations_would_be() -> None:
         succeeded.append(gain[0] >= max(gain[1:]))
     share = np.mean(succeeded)
     assert 0.3 < share < 0.9
-    error = 4 * np.sqrt(share * (1 - share) / 200)
+    error = 2 * np.sqrt(share * (1 - share) / 200)
     assert known.simulated_success(0, 2, 1) == pytest.approx(share, abs=error)
     assert known.simulated_success(0, 2, 3) == 1
     assert replace(known, ends=np.ones((4, 3), dtype=bool)).simulated_success(0, 2, 3) == 0
