@@ -127,7 +127,7 @@ def _led(
     assert own is not None  # as the task is possible
     needed = NEEDED * (1 + len(passage.start))
     latest, proposal = own.policies.of(slice(-len(distribution.modes), None)), own.resized(_PILOT)
-    across = 0  # rounds in which enough paths cross
+    across: int = 0  # rounds in which enough paths cross
     for _ in range(_ROUNDS):
         draws = draw(passage, proposal, rng)
         near = _nearness(distribution, region, draws.paths)
@@ -138,7 +138,7 @@ def _led(
         latest = refit(latest, states, draws.controls, density, passage.limits)
         shares = spread(np.sum(density, axis=0))
         proposal = Proposal.of(latest, shares, _PILOT)
-        across += np.all(near[nearest] == np.inf)
+        across += int(np.all(near[nearest] == np.inf))
         if across == _ACROSS:
             break
     return own.resized(round(_OWN * samples)).joined(Proposal.of(latest, shares, samples))
