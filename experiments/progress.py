@@ -1,4 +1,4 @@
-"""Which step a command is at, on the last line of a terminal.
+"""Which step a command is at: on the last line of a terminal, or now and then a line of a file.
 
 Whatever takes time calls `begin` with the step's name, wherever it is; `steps_shown` listens. It
 also shows that loops are compiled, which mlci logs the first time that a machine needs them.
@@ -7,7 +7,9 @@ also shows that loops are compiled, which mlci logs the first time that a machin
 from __future__ import annotations
 
 import logging
+import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 _COMPILES = logging.getLogger("mlci.compiled")
 _PAUSE = 0.5  # [s] between looks at the clock
+_QUIET = 30.0  # [s] of processor time between lines that are no terminal's: short runs print none
 
 
 def begin(step: str) -> None:
@@ -26,13 +29,25 @@ def begin(step: str) -> None:
 
 
 @contextmanager
-def steps_shown() -> Iterator[None]:
-    """Show the step that this block is at and the time since it began; nothing off a terminal."""
+def steps_shown(quiet: float = _QUIET) -> Iterator[None]:
+    """Show the step that this block is at and the time since it began.
+
+    Args:
+        quiet: processor time [s] that passes between two lines where there is no terminal.
+    """
     from tqdm import tqdm
 
     with tqdm(bar_format="{desc} [{elapsed}]", leave=False, disable=None) as bar:
         if bar.disable:
-            yield
+            lines = _Lines(quiet)
+            level = _LOG.level
+            _LOG.addHandler(lines)
+            _LOG.setLevel(logging.INFO)
+            try:
+                yield
+            finally:
+                _LOG.removeHandler(lines)
+                _LOG.setLevel(level)
             return
         handler, ended = _Shown(bar), threading.Event()
         before = {log: log.level for log in (_LOG, _COMPILES)}
@@ -55,6 +70,21 @@ def steps_shown() -> Iterator[None]:
                 log.setLevel(level)
             ended.set()
             clock.join()
+
+
+class _Lines(logging.Handler):
+    """Prints a message to standard error where the last is some processor time ago."""
+
+    def __init__(self, quiet: float) -> None:
+        super().__init__()
+        self._quiet = quiet
+        self._last = time.process_time()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text, now = record.getMessage(), time.process_time()
+        if text and now - self._last >= self._quiet:
+            print(f"... {text}", file=sys.stderr, flush=True)
+            self._last = now
 
 
 class _Shown(logging.Handler):

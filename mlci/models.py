@@ -5,7 +5,7 @@ For each task that is how probable it is to avoid each region, and how surely th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, singledispatch
 
@@ -22,6 +22,7 @@ from mlci.spaces import Bools, Floats
 from mlci.tabular import TabularModel
 
 Model = TabularModel | SampledModel | RefinedModel
+_ROUGH_SAMPLES, _ROUGH_RESTARTS = 300, 2  # of a first look
 NO_CELLS_AT_ENDS = "a sampled model has no cells: its trajectories begin and end at states"
 
 
@@ -76,6 +77,40 @@ def _refined_distribution(
     model: RefinedModel, task: Task, *, round_horizon: bool = False, exact_ends: bool = True
 ) -> Distribution:
     return model.distribution(task, round_horizon=round_horizon, exact_ends=exact_ends)
+
+
+@singledispatch
+def distributions_of(
+    model: Model, tasks: Sequence[Task], *, round_horizon: bool = False, exact_ends: bool = True
+) -> Iterator[Distribution]:
+    """The distribution of each task, in order; arguments and errors as of `forecasters`."""
+    for task in tasks:
+        yield distribution_of(model, task, round_horizon=round_horizon, exact_ends=exact_ends)
+
+
+@distributions_of.register
+def _sampled_distributions(
+    model: SampledModel,
+    tasks: Sequence[Task],
+    *,
+    round_horizon: bool = False,
+    exact_ends: bool = True,
+) -> Iterator[Distribution]:
+    if not exact_ends:
+        raise ValueError(NO_CELLS_AT_ENDS)
+    return model.distributions(tasks, round_horizon=round_horizon)
+
+
+@singledispatch
+def rough_model(model: Model) -> Model:
+    """A model that takes less time, for a first look at many tasks; the same if there is none."""
+    return model
+
+
+@rough_model.register
+def _with_few_samples(model: SampledModel) -> Model:
+    few = min(model.samples, _ROUGH_SAMPLES), min(model.restarts, _ROUGH_RESTARTS)
+    return replace(model, samples=few[0], restarts=few[1])
 
 
 @singledispatch

@@ -20,7 +20,7 @@ from mlci.demonstrations import Task
 from mlci.inference import Inference
 from mlci.json_numbers import finite
 from mlci.misfit import sample_crossings
-from mlci.models import Model, distribution_of, forecast_of
+from mlci.models import Model, distributions_of, forecast_of, rough_model
 from mlci.regions import as_mask
 from mlci.spaces import Floats, StateSpace
 from mlci.tabular import Progress
@@ -29,6 +29,7 @@ from mlci.task_outcomes import TaskOutcomes, as_forecast, task_outcomes
 SAMPLES = 500  # trajectories drawn for each task
 _IMPLAUSIBLE = 1e-3  # of the posterior: truths that hold no more together are left out
 _FUTURES = 64  # outcomes of the tasks chosen so far, over which the next one of a batch is judged
+_CLOSER = 3  # times as many tasks as are named are looked at again, after a glance at all
 _ALIKE = 0.1  # of a dimension's range: tasks whose ends differ by less are nearly the same
 
 
@@ -106,11 +107,11 @@ def simulate_tasks(
         raise ValueError(f"at least one trajectory is drawn for each task, not {samples}")
     mask, eta = as_mask(hypotheses, len(model.regions)), inference.rates.model_error
     simulated: list[TaskOutcomes | None] = []
-    for number, task in enumerate(tasks):
+    distributions = distributions_of(
+        model, tasks, round_horizon=round_horizon, exact_ends=exact_ends
+    )
+    for number, (task, distribution) in enumerate(zip(tasks, distributions, strict=True)):
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
-        distribution = distribution_of(
-            model, task, round_horizon=round_horizon, exact_ends=exact_ends
-        )
         of_task = forecast_of(distribution)
         if of_task.possible:
             alpha = of_task.avoidance[None, mask]
@@ -168,19 +169,30 @@ def next_tasks(
     """
     if count < 0:
         raise ValueError(f"tasks that are named are counted from 0 up, not {count}")
-    simulated = simulate_tasks(
-        model,
-        inference,
-        tasks,
-        hypotheses=hypotheses,
-        samples=samples,
-        seed=seed,
-        round_horizon=round_horizon,
-        exact_ends=exact_ends,
-        progress=progress,
-    )
-    outcomes = {number: of_task for number, of_task in enumerate(simulated) if of_task is not None}
+
+    def simulated(by: Model, numbers: Sequence[int]) -> dict[int, TaskOutcomes]:
+        """Outcomes of some tasks, by their numbers, but for those that a model cannot do."""
+        found = simulate_tasks(
+            by,
+            inference,
+            [tasks[number] for number in numbers],
+            hypotheses=hypotheses,
+            samples=samples,
+            seed=seed,
+            round_horizon=round_horizon,
+            exact_ends=exact_ends,
+            progress=progress,
+        )
+        pairs = zip(numbers, found, strict=True)
+        return {number: of_task for number, of_task in pairs if of_task is not None}
+
     belief = plausible(np.append(inference.posterior, inference.posterior_none))
+    numbers, rough = list(range(len(tasks))), rough_model(model)
+    if rough is not model and len(tasks) > _CLOSER * count:
+        glance = simulated(rough, numbers)
+        worth = {number: float(each.information(belief)) for number, each in glance.items()}
+        numbers = sorted(worth, key=worth.__getitem__, reverse=True)[: _CLOSER * count]
+    outcomes = simulated(model, numbers)
     beliefs, chosen = belief[None, :], list[NextTask]()
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(len(tasks),)))
     while outcomes and len(chosen) < count:

@@ -42,6 +42,7 @@ def recorded_next_tasks(
         names=list(candidates),
         round_horizon=True,
         exact_ends=settings.inference.exact_ends,
+        progress=lambda done, of: begin(f"choosing what to record next: task {done} of {of}"),
     )
 
 

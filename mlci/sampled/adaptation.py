@@ -71,8 +71,10 @@ def _mixture(first: LocalPolicies, latest: LocalPolicies, shares: Floats, sample
 
 def spread(shares: Floats) -> Floats:
     """Shares (M,) of samples of modes, by their probabilities (M,) of any sum: less unequal."""
-    flatter = shares**_FLATTER
     even = np.full(len(shares), 1 / len(shares))
+    if not np.sum(shares) > 0:
+        return even  # all paths of the pilot left the state space
+    flatter = shares**_FLATTER
     return np.asarray((1 - _EVEN) * flatter / np.sum(flatter) + _EVEN * even)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +11,14 @@ from mlci.demonstrations import REACHED, Task
 from mlci.regions import Regions
 from mlci.sampled.distribution import SEARCH, SampledDistribution, sample_passage
 from mlci.sampled.model_check import check_model
-from mlci.sampled.modes import find_modes
+from mlci.sampled.modes import Modes, find_modes_of
 from mlci.sampled.passage import Passage
 from mlci.simulate import step_count
 from mlci.spaces import Box
 from mlci.systems import System
 
 ROUNDED_TIMES = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
+_AT_ONCE = 64  # tasks whose modes are looked for together
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +83,43 @@ class SampledModel:
 
     def distribution(self, task: Task, *, round_horizon: bool = False) -> SampledDistribution:
         """The distribution of a task; arguments as of `passage`."""
-        passage = self.passage(task, round_horizon=round_horizon)
+        return next(self.distributions([task], round_horizon=round_horizon))
+
+    def distributions(
+        self, tasks: Sequence[Task], *, round_horizon: bool = False
+    ) -> Iterator[SampledDistribution]:
+        """The distribution of each task, in order; modes of many tasks are looked for at once.
+
+        Args:
+            tasks: the tasks.
+            round_horizon: as of `passage`, as are errors.
+        """
+        passages = [self.passage(task, round_horizon=round_horizon) for task in tasks]
+        for first in range(0, len(tasks), _AT_ONCE):
+            block = passages[first : first + _AT_ONCE]
+            keys = [
+                self._key(passage, task)
+                for passage, task in zip(block, tasks[first : first + _AT_ONCE], strict=True)
+            ]
+            found = self._modes(block, keys)
+            for passage, key, modes in zip(block, keys, found, strict=True):
+                yield sample_passage(passage, self.regions, modes, self.samples, key)
+
+    def _key(self, passage: Passage, task: Task) -> tuple[int, ...]:
+        """What seeds the generators of a task."""
         ends = np.concatenate([task.start, passage.goal.lower, passage.goal.upper])
-        words = np.append(ends, task.horizon).view(np.uint32).tolist()
-        key = self.seed, *words
-        modes = find_modes(passage, self.restarts, np.random.default_rng([*key, SEARCH]))
-        return sample_passage(passage, self.regions, modes, self.samples, key)
+        return self.seed, *np.append(ends, task.horizon).view(np.uint32).tolist()
+
+    def _modes(self, passages: Sequence[Passage], keys: Sequence[tuple[int, ...]]) -> list[Modes]:
+        """The modes of each passage; those of passages that are alike at once."""
+        found = dict[int, Modes]()
+        for alike in {(passage.steps, passage.half.tobytes()) for passage in passages}:
+            numbers = [
+                i
+                for i, passage in enumerate(passages)
+                if (passage.steps, passage.half.tobytes()) == alike
+            ]
+            rngs = [np.random.default_rng([*keys[i], SEARCH]) for i in numbers]
+            modes = find_modes_of([passages[i] for i in numbers], self.restarts, rngs)
+            found.update(zip(numbers, modes, strict=True))
+        return [found[i] for i in range(len(passages))]

@@ -127,7 +127,7 @@ def _led(
     assert own is not None  # as the task is possible
     needed = NEEDED * (1 + len(passage.start))
     latest, proposal = own.policies.of(slice(-len(distribution.modes), None)), own.resized(_PILOT)
-    across = 0  # rounds in which enough paths cross
+    across: int = 0  # rounds in which enough paths cross
     for _ in range(_ROUNDS):
         draws = draw(passage, proposal, rng)
         near = _nearness(distribution, region, draws.paths)

@@ -1,4 +1,4 @@
-"""The step that a command is at: on a terminal alone, and gone when something is printed."""
+"""The step that a command is at: on a terminal, where it is gone when something is printed."""
 
 from __future__ import annotations
 
@@ -54,9 +54,15 @@ def test_a_terminal_shows_what_is_compiled_beside_the_step(monkeypatch: pytest.M
     assert not logging.getLogger("mlci.compiled").handlers
 
 
-def test_nothing_is_shown_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("quiet", "lines"), [(1e6, ""), (0.0, "... reading\n... ranking\n")])
+def test_elsewhere_a_line_tells_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, quiet: float, lines: str
+) -> None:
     file = io.StringIO()
     monkeypatch.setattr("sys.stderr", file)
-    with steps_shown():
+    with steps_shown(quiet):
         begin("reading")
-    assert file.getvalue() == ""
+        begin("ranking")
+        begin("")
+    begin("what nobody listens to")
+    assert file.getvalue() == lines

@@ -9,6 +9,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.area_shapes import AreaShapeSettings
+from experiments.config.settings.cells import Shape
 from experiments.config.settings.kinds import (
     STRICT,
     Count,

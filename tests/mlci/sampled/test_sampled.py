@@ -8,10 +8,13 @@ from mlci.demonstrations import Demonstration, Task
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.models import forecast_of
+from mlci.next_task import next_tasks
 from mlci.preparation import infer
 from mlci.regions import Regions
+from mlci.sampled.adaptation import spread
 from mlci.sampled.diagnosis import SamplingDiagnosis
 from mlci.sampled.model import SampledModel
+from mlci.simulate import rollout
 from mlci.spaces import Box, Floats, StateSpace
 from mlci.systems import FunctionSystem, Pendulum, TelescopingPendulum
 from mlci.tabular import action_grid, discretize
@@ -273,3 +276,33 @@ def test_a_search_that_diverges_is_said_to():
     path = Demonstration.from_path(np.linspace(1, 1.5, 21)[:, None], 0.1, name="up")
     (told, _) = infer(model, [path]).warnings
     assert told.startswith("the samples of up are not to be believed: the search")
+
+
+def test_tasks_at_once_are_as_one_by_one():
+    wide = replace(TASK, goal=Box([1.0, -np.inf], [1.4, np.inf]), horizon=2.0)
+    other = replace(TASK, start=np.array([4.0, 1.0]))
+    tasks, model = [TASK, wide, other], replace(MODEL, samples=200, restarts=2)
+    for task, at_once in zip(tasks, model.distributions(tasks), strict=True):
+        alone = model.distribution(task)
+        np.testing.assert_allclose(at_once.modes.cost, alone.modes.cost, rtol=1e-6)
+        assert abs(at_once.log_z - alone.log_z) < 1e-4
+
+
+def test_a_first_look_at_many_tasks_leaves_few_to_look_at_again():
+    model = replace(MODEL, regions=Regions.from_grid(PENDULUM.space, (3, 3)), samples=400)
+    ends = np.random.default_rng(0).uniform([0, -2], [6.2, 2], (5, 2, 2))
+    tasks = [Task(start, Box(goal - 0.1, goal + 0.1), 2.0) for start, goal in ends]
+    path = rollout(PENDULUM, [0.5, 0.0], np.full((200, 1), 0.5), 0.01)
+    inference = infer(model, [Demonstration.from_path(path, 0.01)])
+    looks = list[tuple[int, int]]()
+    best = next_tasks(
+        model, inference, tasks, count=1, progress=lambda done, of: looks.append((done, of))
+    )
+    assert looks == [(1, 5), (2, 5), (3, 5), (4, 5), (5, 5), (1, 3), (2, 3), (3, 3)]
+    each = [next_tasks(model, inference, [task], count=1)[0].information for task in tasks]
+    assert best[0].number == np.argmax(each)
+    assert best[0].information == pytest.approx(max(each), abs=0.03)
+
+
+def test_shares_of_a_pilot_that_left_the_state_space_are_even():
+    np.testing.assert_allclose(spread(np.zeros(4)), 0.25)
