@@ -52,7 +52,7 @@ def _predicate_problems(settings: ModelSettings, actions: Floats) -> Iterator[st
     states = rng.uniform(bounds.lower, bounds.upper, (_STATES, 1, bounds.dimension))
     for number, each in enumerate(settings.hypotheses.controls.predicates):
         key = f"hypotheses.controls.predicates[{number}]"
-        predicate = ControlPredicates([each.function()], [each.name])
+        predicate = ControlPredicates([each.function()], (each.name,))
         try:
             predicate.check(system)
             held = predicate.holds(states, actions[None])
