@@ -30,6 +30,7 @@ V       values                safe set's value function                  unit of
 from typing import TYPE_CHECKING, Any
 
 from mlci.actuation.inference import ControlInference, calibrate_controls, infer_controls
+from mlci.actuation.joint import JointInference, infer_joint
 from mlci.actuation.predicates import ControlPredicates
 from mlci.actuation.ranges import ControlRanges
 from mlci.calibration import Calibration, calibrate
@@ -109,6 +110,7 @@ __all__ = [
     "InTaskSpace",
     "Inference",
     "JointBarrier",
+    "JointInference",
     "MultilinearModel",
     "NextTask",
     "Pendulum",
@@ -151,6 +153,7 @@ __all__ = [
     "explore",
     "infer",
     "infer_controls",
+    "infer_joint",
     "infer_sets",
     "infer_table",
     "infer_until_settled",

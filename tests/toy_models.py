@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 from scipy import sparse
 
+from mlci.actuation.predicates import PairFunction
 from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.single_moves import SingleMoves
@@ -51,3 +52,8 @@ def every_trajectory(model: TabularModel, goal: int, steps: int) -> tuple[Bools,
             crossed.append(row)
             weight.append(np.exp(reward))
     return np.array(crossed), np.array(weight) / np.sum(weight)
+
+
+def hard_push(above: float) -> PairFunction:
+    """Pushes harder than some control, in any state."""
+    return lambda states, controls: controls[..., 0] > above

@@ -100,13 +100,17 @@ def _chosen(at: pd.DataFrame) -> str:
         else "-"
         for name in ("chosen", "shapes", "ideal_chosen")
     )
-    apart = at.loc["chosen", "iou_low"] > at.loc["shapes", "iou_high"]
-    verdict = "more than" if apart else "which the intervals do not tell apart from"
+    verdict = "which the intervals do not tell apart from"
+    if at.loc["chosen", "iou_low"] > at.loc["shapes", "iou_high"]:
+        verdict = "more than"
+    elif at.loc["chosen", "iou_high"] < at.loc["shapes", "iou_low"]:
+        verdict = "less than"
     return (
         "Tasks may be *chosen*: one after the other, each is the one after which the area is "
         "expected to overlap best, over demonstrations that are simulated under each plausible "
         f"truth. {SHOWN} chosen tasks reach {chosen}, {verdict} {random} of random ones; where all "
-        f"that is assumed is right, {ideal}. Random tasks are none at random here: like those to "
-        "choose from, each is known to lead through what is forbidden, which the belief that "
-        "chooses does not know.\n\n"
+        f"that is assumed is right, {ideal}. All tasks to choose from lead through what is "
+        "forbidden, which the belief that chooses does not know: it takes the longest first, that "
+        "might meet most, where any would have met something. Nor does it know how much is told by "
+        "a detour that hardly any trajectory takes.\n\n"
     )

@@ -19,6 +19,7 @@ from experiments.config.settings import (
     ControlHypothesesSettings,
     ControlRange,
     HalfSpaceSettings,
+    PredicateSettings,
     Region,
     ShapeSettings,
 )
@@ -139,7 +140,8 @@ def test_every_setting_changes_identity() -> None:
         "shapes": (ShapeSettings("own.ring", {"width": 1.0}),),
     }
     limits = (ControlRange((0.5,), (None,)),)
-    controls = ControlHypothesesSettings(limits, (0.5,), 0.02)
+    predicates = (PredicateSettings("own.push", {"above": 1.0}),)
+    controls = ControlHypothesesSettings(limits, predicates, (0.5,), 0.02, 0.1)
     truth = dataclasses.replace(settings.truth, **kinds, controls=limits)
     hypotheses = dataclasses.replace(settings.hypotheses, **kinds, controls=controls)
     settings = dataclasses.replace(settings, truth=truth, hypotheses=hypotheses)
