@@ -78,7 +78,6 @@ class TaskSettings(TaskBoxSettings):
 
 
 @dataclass(frozen=True, config=STRICT)
-@dataclass(frozen=True, config=STRICT)
 class DemonstrationSettings:
     """How demonstrations are generated."""
 
