@@ -14,7 +14,7 @@ from experiments.tracking.files import digest
 from experiments.tracking.points import Point, State
 
 # Changing this makes every point of every study anew: only when what a point is has changed.
-DEFAULT_POINT = "2c91d9a1efefb23a2d604a17219328e6"
+DEFAULT_POINT = "33274a1c67e4ed0e53c7ff989125ac1e"
 CONFIG = {"dt": 0.5, "system": {"target": "mlci.systems.Pendulum", "arguments": {}}}
 HOLDER = """
 import sys, time
