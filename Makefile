@@ -107,6 +107,7 @@ $(READY): requirements.lock pyproject.toml
 	$(environment)
 	$(INSTALL) --requirement requirements.lock
 	$(INSTALL) --quiet --no-deps --editable .
+	$(BIN)/python -m mlci.precompile
 	@touch .venv/installed $@
 
 .venv/installed: requirements.lock pyproject.toml
@@ -114,5 +115,6 @@ $(READY): requirements.lock pyproject.toml
 	$(BIN)/python .ci/needed.py $(EXTRAS) > .venv/needed.lock
 	$(INSTALL) --requirement .venv/needed.lock
 	$(INSTALL) --quiet --no-deps --editable .
+	$(BIN)/python -m mlci.precompile
 	@test -e $(READY) || $(PIP) uninstall --quiet --yes setuptools
 	@touch $@

@@ -136,3 +136,21 @@ def test_a_mask_takes_the_hypotheses_alone(model, paths) -> None:
 def test_no_path_is_refused(model) -> None:
     with pytest.raises(ValueError, match="an outlook needs the optimal path of a task at least"):
         outlook(model, [])
+
+
+def test_a_detour_keeps_out_of_a_region_that_the_best_way_enters(model, paths) -> None:
+    every = np.ones(len(REGIONS), dtype=bool)
+    tasks = [path.task for path in paths]
+    nothing = np.zeros(len(REGIONS), dtype=bool)
+    free = model.under(nothing).with_temperature(0.02 * model.temperature)
+    detours, kept_out = tabular_detours(model, tasks, every), 0
+    for number, task in enumerate(tasks):
+        distribution = TrajectoryDistribution.of_task(free, task)
+        if not distribution.is_possible:
+            continue
+        cells, moves = distribution.sample(1, np.random.default_rng(0))
+        for region in np.flatnonzero(model.crossed(cells[:, :-1], moves)[0]).tolist():
+            (crossed,) = detours(region, np.array([number]))
+            assert not crossed[region]
+            kept_out += int(crossed.any())
+    assert kept_out  # of some regions there is a way round
