@@ -217,6 +217,8 @@ def _chance(unlike: int, count: int, simulated: int) -> float:
     0.01 (n + 1). As all orders of the N + n are equally probable, k are with probability
     C(k + r - 1, k) C(N - k + n - r, N - k) / C(N + n, N).
     """
+    if not unlike:
+        return 1.0
     rank = math.ceil(RARE * (simulated + 1)) - 1  # p is below 0.01, not equal to it
     k = np.arange(unlike, count + 1)
     total = _log_choose(count + simulated, count)

@@ -75,12 +75,12 @@ def test_pairs_of_a_point(tmp_path: Path) -> None:
     assert len(pairs) == 11 * 5  # ten slices and none, four ranges and none
     assert pairs["posterior"].sum() == pytest.approx(1)
     truth = pairs[pairs["is_truth"]]
-    assert truth["controls"].tolist() == ["control 0 above 0.4"]
+    assert truth["controls"].tolist() == ["control 1 above 0.4"]
     assert truth["region"].tolist() == ["6"]
     ranks = pd.read_csv(point.folder / "joint_ranks.csv")
     kinds = ranks[["of_nothing", "of_region", "of_controls", "of_both"]]
     np.testing.assert_allclose(kinds.sum(axis=1), 1)
-    first = (ranks["first_region"] == "6") & (ranks["first_controls"] == "control 0 above 0.4")
+    first = (ranks["first_region"] == "6") & (ranks["first_controls"] == "control 1 above 0.4")
     np.testing.assert_array_equal(ranks["true_first"], first)
     curve = joint_curve(ranks.astype({"truth": str}))
     assert curve["posterior"].iloc[-1] == pytest.approx(

@@ -82,9 +82,9 @@ def test_a_truth_of_several_hypotheses_is_known_by_the_one_that_is_crossed_most(
     (row,) = dynamics_table(settings, point, measures, ranks, store).to_dict("records")
     known = outlook(point.tabular, unconstrained_paths(settings, store), point.hypotheses)
     assert np.argmax(known.crossed[covered]) == 1  # neither the first nor the last
-    features = known.features(settings.ranks.demonstrations)
-    np.testing.assert_allclose([row[name] for name in FEATURES], features[64])
-    assert not np.allclose(features[64], features[63])
+    middle, first = known.features([64, 63], settings.ranks.demonstrations, settings.ranks.top)
+    np.testing.assert_allclose([row[name] for name in FEATURES], middle)
+    assert not np.allclose(middle, first)
 
 
 def test_no_demonstration_has_a_part_in_what_is_known_before() -> None:
