@@ -30,6 +30,7 @@ ROUND_GOALS, VARYING, OF_TASK = "round goals", "varying", "of each task"
 Cells = TabularModel | RefinedModel
 
 _TOLERANCE = 0.02  # of the goal, where paths are sampled: a fifth of a cell, to be near a point
+_FEW_CELLS = 2000  # not worth exploring, and often too coarse for it
 
 
 def resolution_table(settings: Settings, point: PointInference) -> pd.DataFrame:
@@ -111,12 +112,13 @@ def _scaled(grid: Grid, count: int) -> Grid:
 
 
 def _ways(model: Cells, tasks: Sequence[Task]) -> Iterator[TrajectoryDistribution]:
-    """The distributions of tasks, one after the other; of equal cells, only those are followed that
-    the tasks come by."""
+    """The distributions of tasks, one after the other; of many equal cells, only those are followed
+    that the tasks come by."""
     if isinstance(model, RefinedModel):
         yield from map(model.distribution, tasks)
         return
-    if type(model) is TabularModel and isinstance(model.grid, Grid):
+    equal = type(model) is TabularModel and isinstance(model.grid, Grid)
+    if equal and model.grid.size > _FEW_CELLS:
         model = explore(model, tasks)
     for task in tasks:
         yield TrajectoryDistribution.of_task(model, task, exact_ends=True)
