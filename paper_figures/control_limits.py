@@ -56,7 +56,8 @@ def draw(control_curve: pd.DataFrame, cases: pd.DataFrame) -> Figure:
         for number, (case, each) in enumerate(limited.items()):
             look = number % len(STEP_COLOURS)
             best = each[each["calibrated"] == each["calibrated"].max()]
-            label = f"u {case} {UNIT}"
+            limit, comma, more = case.partition(",")
+            label = f"u {limit} {UNIT}{comma}{more}"
             for place, name in zip(axes, ("true_first", "posterior"), strict=False):
                 line = "-" if number < len(STEP_COLOURS) else "--"
                 _curve(place, best, name, STEP_COLOURS[look], STEP_MARKS[look], line, label)
