@@ -133,10 +133,12 @@ def misfit(
     count, distance = np.sum(violated, axis=1), np.sum(np.abs(phi - violated), axis=1)
     excess, others = excess_of(phi, violated), np.asarray(simulated, dtype=float)
     count_p, distance_p, unlike_p = np.full((3, len(violated)), np.nan)
-    for j, distribution in enumerate(distributions):
+    is_compared = len(others) >= 1 / RARE
+    # Without anything to compare with, no distribution is asked for: sampled ones take seconds.
+    for j, distribution in enumerate(distributions if samples or is_compared else ()):
         if not distribution.is_possible:
             continue
-        if len(others) >= 1 / RARE:
+        if is_compared:
             unlike_p[j] = _tail(others >= excess[j] - 1e-9)
         if not samples:
             continue

@@ -45,7 +45,7 @@ def check(study: str) -> str:
         done = run_here(run.main, *words, folder=Path(folder))
     assert done.returncode == 0, f"{study}: {done.stderr}"
     first, *others = done.stdout.splitlines()
-    assert re.fullmatch(r"(\d+) points: \1 missing; \1 to run", first), f"{study}: {first}"
+    assert re.fullmatch(r"(\d+) points?: \1 missing; \1 to run", first), f"{study}: {first}"
     assert "repeat others" not in done.stdout, f"{study}: {others[0]}"
     assert "stand for all of" not in done.stdout or study == "smoke", f"{study}: {others}"
     compare_with_hydra(study)
