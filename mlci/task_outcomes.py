@@ -27,7 +27,7 @@ import scipy  # loads scipy.special when it is first used
 from numpy.typing import ArrayLike
 
 from mlci.evidence import PAPER, Rates
-from mlci.spaces import Bools, Floats
+from mlci.spaces import Bools, Floats, Ints
 
 _FEWEST = 10  # trajectories that must avoid a region for their share to tell its probability
 _REVEALS = 0.1  # of the posterior: a demonstration that moves less of it reveals nothing
@@ -106,14 +106,28 @@ def task_outcomes(violated: Bools, rates: Rates = PAPER) -> TaskOutcomes:
             `as_forecast`.
     """
     outcomes, counts = np.unique(violated, axis=0, return_counts=True)
-    share = counts / len(violated)
-    avoids = np.where(outcomes, 0.0, share[:, None])
-    avoidance = np.sum(avoids, axis=0)
-    rare = avoidance * len(violated) < _FEWEST
-    obeying = np.where(rare, 0.0, avoids / np.where(rare, 1.0, avoidance))
-    eps = rates.rule_breaking
-    under = (1 - eps) * np.vstack([obeying, rare]) + eps * np.append(share, 0.0)[:, None]
-    return TaskOutcomes(np.column_stack([under, np.append(share, 0.0)]), len(violated))
+    under = under_truths(~outcomes, counts, rates.rule_breaking)
+    share = np.append(counts / len(violated), 0.0)
+    return TaskOutcomes(np.column_stack([under, share]), len(violated))
+
+
+def under_truths(avoids: Bools, counts: Ints, unruly: float) -> Floats:
+    """(O+1, C) probability of each outcome under each truth; columns add up to 1.
+
+    The last outcome is what no trajectory shows: what is demonstrated under truths that hardly any
+    of them avoids.
+
+    Args:
+        avoids: (O, C) which outcomes avoid each truth.
+        counts: (O,) trajectories with each outcome.
+        unruly: share of demonstrations that are the same under every truth, as by who breaks rules.
+    """
+    avoiding = np.where(avoids, counts[:, None], 0)
+    total = np.sum(avoiding, axis=0)
+    rare = total < _FEWEST
+    obeying = np.where(rare, 0.0, avoiding / np.maximum(total, 1))
+    share = np.append(counts / np.sum(counts), 0.0)
+    return (1 - unruly) * np.vstack([obeying, rare]) + unruly * share[:, None]
 
 
 def as_forecast(

@@ -109,7 +109,7 @@ MLCI = {
     "mlci.areas.overlap": "mlci.spaces",
     "mlci.areas.evidence": "mlci.misfit mlci.evidence",
     "mlci.areas.belief": "mlci.areas.evidence mlci.areas.overlap mlci.credible_sets",
-    "mlci.areas.next_task": "mlci.areas.belief",
+    "mlci.areas.next_task": "mlci.areas.belief mlci.task_outcomes",
     "mlci.rivals.agent": "mlci.worlds.tables",
     "mlci.rivals.problem": "mlci.rivals.agent",
     "mlci.rivals.set_gains": "mlci.rivals.problem mlci.sets.evidence",

@@ -66,7 +66,6 @@ def recorded_beliefs(
     controls = joint = area = None
     if isinstance(model, TabularModel):
         controls = recorded_controls(settings, model, demonstrations, exported)
-        begin("weighing regions and controls at once")
         joint = joint_belief(settings, model, demonstrations, inference, controls)
         begin("weighing areas of one or two shapes")
         area = area_belief(settings, model, demonstrations, inference, np.random.default_rng(0))

@@ -10,6 +10,7 @@ import pandas as pd
 
 from experiments.config.settings import ModelSettings, Settings
 from experiments.point.controls import against_truth
+from experiments.progress import begin
 from mlci.actuation.inference import ControlInference
 from mlci.actuation.joint import KINDS, NOTHING, JointInference, infer_joint
 from mlci.demonstrations import Demonstration
@@ -44,6 +45,7 @@ def joint_belief(
     both = settings.hypotheses.controls.both
     if controls is None or not both:
         return None
+    begin("weighing regions and controls at once")
     some = 1 - settings.inference.prior
     alone = some * (1 - both) / 2
     return infer_joint(

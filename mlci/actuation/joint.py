@@ -144,12 +144,10 @@ class JointInference:
     @property
     def _kind(self) -> Ints:
         """(C + 1, J + 1) which of `KINDS` a pair is."""
-        of_region, of_control = (np.arange(len(each)) < len(each) - 1 for each in self._axes)
+        of_region, of_control = (
+            np.arange(len(each)) < len(each) - 1 for each in (self.regions, self.controls)
+        )
         return of_region[:, None] + 2 * of_control[None, :].astype(np.int64)
-
-    @property
-    def _axes(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        return self.regions, self.controls
 
 
 def infer_joint(

@@ -18,9 +18,9 @@ import numpy as np
 from mlci.areas.belief import SIZES, sets_of_shapes
 from mlci.areas.evidence import ShapeEvidence
 from mlci.spaces import Bools, Floats, Ints
+from mlci.task_outcomes import under_truths
 
 DRAWS = 300  # truths
-_FEWEST = 10  # trajectories that must avoid a truth for them to tell its demonstrations
 
 
 def expected_overlaps(
@@ -54,7 +54,8 @@ def expected_overlaps(
     for number, avoided in enumerate(evidence.avoided):
         if avoided is not None:
             keeps_out = avoided[:, truths[:, 0]] & avoided[:, truths[:, 1]]
-            joint = outcomes(keeps_out, evidence.rates.model_error) * share
+            once = np.ones(len(keeps_out), dtype=np.int64)
+            joint = under_truths(keeps_out, once, evidence.rates.model_error) * share
             worth[number] = float(np.sum(np.max(joint @ overlaps, axis=1)))
     return worth
 
@@ -87,23 +88,6 @@ def choose_tasks(
             break
         chosen.append(int(np.nanargmax(worth)))
     return np.array(chosen, dtype=np.int64)
-
-
-def outcomes(keeps_out: Bools, model_error: float) -> Floats:
-    """Probability (S + 1, B) of each outcome of a task under each truth; columns add up to 1.
-
-    An outcome is one of S trajectories; the last one stands for what none of them shows, the
-    demonstrations under truths that hardly any trajectory avoids.
-
-    Args:
-        keeps_out: (S, B) which trajectories avoid each truth.
-        model_error: share of demonstrations that are the same under every truth.
-    """
-    samples, count = len(keeps_out), np.sum(keeps_out, axis=0)
-    rare = count < _FEWEST
-    of_truth = np.where(rare, 0.0, keeps_out / np.maximum(count, 1))
-    shown = (1 - model_error) * of_truth + model_error / samples
-    return np.vstack([shown, np.where(rare, 1 - model_error, 0.0)])
 
 
 def pairwise_overlaps(masks: Bools) -> Floats:

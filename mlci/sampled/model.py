@@ -112,13 +112,10 @@ class SampledModel:
 
     def _modes(self, passages: Sequence[Passage], keys: Sequence[tuple[int, ...]]) -> list[Modes]:
         """The modes of each passage; those of passages that are alike at once."""
-        found = dict[int, Modes]()
-        for alike in {(passage.steps, passage.half.tobytes()) for passage in passages}:
-            numbers = [
-                i
-                for i, passage in enumerate(passages)
-                if (passage.steps, passage.half.tobytes()) == alike
-            ]
+        found, alike = dict[int, Modes](), dict[tuple[int, bytes], list[int]]()
+        for i, passage in enumerate(passages):
+            alike.setdefault((passage.steps, passage.half.tobytes()), []).append(i)
+        for numbers in alike.values():
             rngs = [np.random.default_rng([*keys[i], SEARCH]) for i in numbers]
             modes = find_modes_of([passages[i] for i in numbers], self.restarts, rngs)
             found.update(zip(numbers, modes, strict=True))

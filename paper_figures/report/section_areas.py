@@ -67,12 +67,7 @@ def _shapes(curve: pd.DataFrame) -> str:
     at = curve[curve["demonstrations"] == SHOWN].set_index("method")
     if "shapes" not in at.index or "expected" not in curve:
         return ""
-    overlap, ideal, shown = (
-        between(*(number(at.loc[name, f"iou{end}"], 2) for end in ("", "_low", "_high")))
-        if name in at.index
-        else "-"
-        for name in ("shapes", "ideal", "shown")
-    )
+    overlap, ideal, shown = (_overlap(at, name) for name in ("shapes", "ideal", "shown"))
     climb = number(at.loc["climb", "iou"], 2)
     return (
         "An area of *shapes* is inferred without squares: nothing, one or two of many ellipses are "
@@ -90,16 +85,18 @@ def _shapes(curve: pd.DataFrame) -> str:
     )
 
 
+def _overlap(at: pd.DataFrame, method: str) -> str:
+    """The overlap of a method with its interval, from rows by method."""
+    if method not in at.index:
+        return "-"
+    return between(*(number(at.loc[method, f"iou{end}"], 2) for end in ("", "_low", "_high")))
+
+
 def _chosen(at: pd.DataFrame) -> str:
     """What it brings to choose tasks, from the rows of SHOWN demonstrations by method."""
     if "chosen" not in at.index:
         return ""
-    chosen, random, ideal = (
-        between(*(number(at.loc[name, f"iou{end}"], 2) for end in ("", "_low", "_high")))
-        if name in at.index
-        else "-"
-        for name in ("chosen", "shapes", "ideal_chosen")
-    )
+    chosen, random, ideal = (_overlap(at, name) for name in ("chosen", "shapes", "ideal_chosen"))
     verdict = "which the intervals do not tell apart from"
     if at.loc["chosen", "iou_low"] > at.loc["shapes", "iou_high"]:
         verdict = "more than"

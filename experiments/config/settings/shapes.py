@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,13 +10,7 @@ from pydantic import BeforeValidator
 from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.kinds import STRICT, Number, Positive, Word, about
-from experiments.config.settings.targets import (
-    arguments_of,
-    named,
-    problem,
-    target_error,
-    target_of,
-)
+from experiments.config.settings.targets import FunctionSettings, read_function
 from mlci.shapes.balls import Ball
 from mlci.shapes.half_spaces import HalfSpace
 from mlci.shapes.shape import Shape
@@ -74,45 +68,26 @@ class HalfSpaceSettings:
 
 
 @dataclass(frozen=True, config=STRICT)
-class ShapeSettings:
+class ShapeSettings(FunctionSettings):
     """A shape of one's own: what a function or class makes of its arguments."""
 
     target: Annotated[Word, about("dotted name of what returns a mlci.shapes.shape.Shape")]
-    arguments: Annotated[Mapping[str, Any], about("what it takes")]
 
     def shape(self) -> Shape:
         """The shape itself."""
-        made: Shape = named(self.target)(**self.arguments)
+        made: Shape = self.made()
         return made
 
 
 def read_shape(tree: Any) -> ShapeSettings:
-    """A shape from `_target_` and the arguments beside it.
-
-    Raises:
-        ValidationError: an argument that it does not take, lacks, or takes otherwise.
-        PydanticCustomError: nothing that makes a shape.
-    """
-    if isinstance(tree, ShapeSettings):
-        return tree
-    target = target_of(tree, "a function that returns a region, such as your_module.ring")
-    try:
-        maker = named(target)
-    except ValueError as error:
-        raise target_error(target, str(error)) from None
-    if not callable(maker):
-        raise target_error(target, f"{target!r} is no function")
-    settings = ShapeSettings(target, arguments_of(maker, target, tree))
-    try:
-        shape = settings.shape()
-    except Exception as error:  # it may be anybody's function
-        raise problem(f"{target} fails: {type(error).__name__}: {error}") from None
-    if not isinstance(shape, Shape):
-        raise problem(
-            f"{target} must return a region of mlci, such as a Ball, a Predicate or a union of "
-            f"them, not {type(shape).__name__}"
-        )
-    return settings
+    """A shape from `_target_` and the arguments beside it; errors as of `read_function`."""
+    return read_function(
+        ShapeSettings,
+        tree,
+        "a function that returns a region, such as your_module.ring",
+        Shape,
+        "a region of mlci, such as a Ball, a Predicate or a union of them",
+    )
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -10,13 +10,22 @@ import typing
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typing_extensions
 from pydantic import BeforeValidator, TypeAdapter, with_config
+from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
-from experiments.config.settings.kinds import STRICT, Flag, Number, Whole, Word, one_or_list
+from experiments.config.settings.kinds import (
+    STRICT,
+    Flag,
+    Number,
+    Whole,
+    Word,
+    about,
+    one_or_list,
+)
 
 _EXACT = 2.0**53  # floats below are equal to one whole number alone
 
@@ -121,6 +130,54 @@ def _kind(hint: Any) -> Any:
         kind = one_or_list(others[0], lists[0]) if others and lists else [*others, *lists][0]
         return typing.Optional[kind] if type(None) in parts else kind  # noqa: UP045
     return hint if hint is type(None) else _KINDS.get(hint, _ANY)
+
+
+@dataclass(frozen=True, config=STRICT)
+class FunctionSettings:
+    """What a function or class of one's own makes of its arguments."""
+
+    target: Annotated[Word, about("dotted name of what makes it")]
+    arguments: Annotated[Mapping[str, Any], about("what it takes")]
+
+    def made(self) -> Any:
+        """The thing itself."""
+        return named(self.target)(**self.arguments)
+
+
+F = TypeVar("F", bound=FunctionSettings)
+
+
+def read_function(kind: type[F], tree: Any, example: str, wanted: type, what: str) -> F:
+    """What `_target_` makes of the arguments beside it, tried once.
+
+    Args:
+        kind: of the settings.
+        tree: what the config says; settings are left as they are.
+        example: what `_target_` should be, in words.
+        wanted: what it must make,
+        what: in words.
+
+    Raises:
+        ValidationError: an argument that it does not take, lacks, or takes otherwise.
+        PydanticCustomError: nothing that makes what is wanted.
+    """
+    if isinstance(tree, kind):
+        return tree
+    target = target_of(tree, example)
+    try:
+        maker = named(target)
+    except ValueError as error:
+        raise target_error(target, str(error)) from None
+    if not callable(maker):
+        raise target_error(target, f"{target!r} is no function")
+    settings = kind(target, arguments_of(maker, target, tree))
+    try:
+        made = settings.made()
+    except Exception as error:  # it may be anybody's function
+        raise problem(f"{target} fails: {type(error).__name__}: {error}") from None
+    if not isinstance(made, wanted):
+        raise problem(f"{target} must return {what}, not {type(made).__name__}")
+    return settings
 
 
 def target_error(value: Any, words: str) -> ValidationError:

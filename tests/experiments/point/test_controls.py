@@ -16,11 +16,13 @@ from experiments.config.settings import Settings
 from experiments.point import controls, trials
 from experiments.point.inference import infer_point
 from experiments.point.joint import true_pairs
+from experiments.point.keep_out import keep_out
 from experiments.point.stages import safe_set
 from experiments.tracking.store import Store
 from experiments.tracking.trees import canonical_json
 from mlci.evidence import Rates
 from mlci.forecasts import ForecastCurve, ForecastMap
+from mlci.simulate import RK4
 
 # The cart pushes no harder than 0.4 m/s^2, of 1.
 WEAK = ("truth=none", "truth.name=weak", "truth.controls=[{lower: [0.4], upper: [null]}]")
@@ -66,6 +68,10 @@ def test_who_is_limited_and_keeps_out_of_a_region_does_both(tmp_path: Path) -> N
     coming = np.array([[2.0, -1.0], [-0.2, 1.0]])  # from the right, and from the left
     assert (free.value(coming) > 0).tolist() == [True, True]
     assert (limited.value(coming) > 0).tolist() == [False, True]
+    at_the_border = np.array([[1.66, -0.6]])  # of what 0.4 m/s^2 can brake: 0.45 m before it
+    towards = np.array([[-1.0]])
+    pushed = keep_out(both, Store(tmp_path), RK4).filter.apply(at_the_border, towards)
+    np.testing.assert_allclose(pushed, 0.4)
 
 
 def test_pairs_of_a_point(tmp_path: Path) -> None:

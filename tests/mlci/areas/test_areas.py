@@ -180,6 +180,14 @@ def test_shapes_that_meet_are_not_forbidden_together() -> None:
         infer_area(evidence, np.random.default_rng(0), sizes, together=together[:2, :2])
 
 
+def test_pairs_that_may_all_be_forbidden_together_are_as_without_a_mask() -> None:
+    evidence, every = by_hand(Rates(0.05)), np.ones((5, 5), dtype=bool)
+    with_mask, without = sets_of_shapes(evidence, together=every), sets_of_shapes(evidence)
+    np.testing.assert_array_equal(with_mask.members, without.members)
+    np.testing.assert_allclose(with_mask.probability, without.probability)
+    assert with_mask.some == pytest.approx(without.some)
+
+
 def test_no_area_where_every_shape_is_excluded() -> None:
     evidence = by_hand(Rates())
     evidence.violated[:] = True

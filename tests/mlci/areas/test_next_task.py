@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from mlci.areas.evidence import ShapeEvidence
-from mlci.areas.next_task import choose_tasks, expected_overlaps, outcomes
+from mlci.areas.next_task import choose_tasks, expected_overlaps
 from mlci.evidence import Rates
 from mlci.grids import Grid
 from mlci.spaces import Box, StateSpace
+from mlci.task_outcomes import under_truths
 
 RASTER = Grid(StateSpace(Box([0.0], [6.0]), [False], ("place",)), (6,))
 ONE = (0.5, 0.5, 0.0)  # of nothing, one shape, two
@@ -59,7 +60,7 @@ def test_tasks_are_chosen_one_after_the_other_as_long_as_there_are_any() -> None
 def test_truths_that_hardly_any_trajectory_avoids_share_an_outcome() -> None:
     keeps_out = np.zeros((50, 3), dtype=bool)
     keeps_out[:20, 0] = keeps_out[:9, 1] = True
-    likelihood = outcomes(keeps_out, 0.1)
+    likelihood = under_truths(keeps_out, np.ones(50, dtype=int), 0.1)
     np.testing.assert_allclose(likelihood.sum(axis=0), 1)
     np.testing.assert_allclose(likelihood[-1], [0, 0.9, 0.9])
     np.testing.assert_allclose(likelihood[:20, 0], 0.9 / 20 + 0.1 / 50)
