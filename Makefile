@@ -15,6 +15,10 @@ OTHERS := $(filter-out $(STUDIES) smoke,$(basename $(notdir $(wildcard conf/expe
 # share or writes its tables, the other computes.
 HALF := $(shell echo $$(( ($$(getconf _NPROCESSORS_ONLN) + 1) / 2 )))
 
+# The longest first.
+STRESS := $(addprefix tests/stress/,hydra14.sh storm.py plans.py long_tests.sh fuzz.py)
+STRESS += $(filter-out $(STRESS),$(wildcard tests/stress/*.py tests/stress/*.sh))
+
 # Each line of a study with its name, as another one runs beside it.
 SAY = (trap "" INT; awk "{ print \"$*: \" \$$0; fflush() }")
 
@@ -66,12 +70,13 @@ smoke-%: $(READY)
 test: $(READY) ## run the tests, on all cores
 	$(BIN)/python -m pytest -n logical --dist worksteal
 
+# Two at a time, as most of them wait for processes and clocks.
 stress: $(READY) ## run what is too long for the tests: kill storms, fuzzing, clusters, Hydra 1.4, slow oracles
-	@set -e; for each in $(wildcard tests/stress/*.py) $(wildcard tests/stress/*.sh); do \
-		echo "=== $$each"; start=$$(date +%s); \
-		case $$each in *.py) $(BIN)/python $$each;; *) $$each;; esac; \
-		echo "=== $$each: $$(($$(date +%s) - start)) s"; \
-	done
+	@$(MAKE) --no-print-directory --jobs=2 $(STRESS:tests/stress/%=stress-%)
+
+stress-%: $(READY)
+	@bash -o pipefail -c 'TIMEFORMAT="$*: took %0R s"; time { \
+		case $* in *.py) $(BIN)/python tests/stress/$*;; *) tests/stress/$*;; esac; } 2>&1 | $(SAY)'
 
 lint: $(READY) ## check style, formatting and types
 	$(BIN)/ruff check
