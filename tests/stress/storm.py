@@ -26,7 +26,7 @@ sys.path[:0] = [str(TESTS.parent), str(TESTS)]
 
 from sweeps import faulty, gone, running, start, tables
 
-KILLS = 20
+KILLS = 12
 SEED = 2026
 # In each worker: whoever finishes a point says so, in a file that is only ever appended to.
 COUNTING = """
@@ -42,13 +42,13 @@ _attempt.write_result = _counted
 
 
 def folder_for(base: Path, name: str) -> tuple[Path, list[str]]:
-    """A new folder, and the sweep of 24 points of about a second in it."""
+    """A new folder, and the sweep of 12 points of about a second in it."""
     folder = base / name
     folder.mkdir()
     sweep = ["-m", *faulty(folder), "+system.fault=slow", "study=s", "workers=2"]
     with open(folder / "faulty.py", "a") as file:
         file.write(COUNTING)
-    return folder, [*sweep, "seed=0,1,2,3,4,5", "actions=2,3", "temperature=1,2"]
+    return folder, [*sweep, "seed=0,1,2", "actions=2,3", "temperature=1,2"]
 
 
 def check_whole(folder: Path, points: int, expected: dict[str, bytes]) -> None:
@@ -78,7 +78,7 @@ def undisturbed(base: Path) -> dict[str, bytes]:
     if not (base / "calm").exists():
         calm, sweep = folder_for(base, "calm")
         finish(calm, sweep)
-        check_whole(calm, 24, {})
+        check_whole(calm, 12, {})
     return tables(base / "calm", "s")
 
 
@@ -151,10 +151,10 @@ def kill_storm(base: Path) -> None:
         is_told = second.returncode == 1 and "points failed" in err
         assert second.returncode == 0 or is_told, f"{out}\n{err}"
         ends += crowd.stop()
-        check_whole(folder, 24, expected)
+        check_whole(folder, 12, expected)
         assert not (folder / "results" / "trash").exists()
     print(
-        f"kill storm: {kills.total()} kills ({dict(kills)}) over {storms} sweeps of 24 points, "
+        f"kill storm: {kills.total()} kills ({dict(kills)}) over {storms} sweeps of 12 points, "
         f"each beside a second one and a crowd ({dict(ends)}); tables equal; the last process "
         f"was gone {slowest:.2f} s after its parent"
     )
@@ -213,7 +213,7 @@ def terminated(base: Path) -> None:
     assert "Traceback" not in err, err
     assert gone(process.pid), "processes are left"
     finish(folder, sweep)
-    check_whole(folder, 24, undisturbed(base))
+    check_whole(folder, 12, undisturbed(base))
     print("terminated: stopped, resumed, each point once, tables equal")
 
 
@@ -224,10 +224,10 @@ def two_at_once(base: Path) -> None:
     both = [start(folder, *sweep) for _ in range(2)]
     outputs = [process.communicate(timeout=600) for process in both]
     assert [process.returncode for process in both] == [0, 0], outputs
-    check_whole(folder, 24, expected)
+    check_whole(folder, 12, expected)
     shared = [len([line for line in out.splitlines() if line[:1] == "["]) for out, _ in outputs]
     waited = sum("waiting for" in out for out, _ in outputs)
-    print(f"two sweeps at once: 24 points, each once; {shared} looked at, {waited} waited")
+    print(f"two sweeps at once: 12 points, each once; {shared} looked at, {waited} waited")
 
 
 def full_disk(base: Path) -> None:
@@ -245,10 +245,10 @@ def full_disk(base: Path) -> None:
         assert "No space left on device" in err, err
         assert not list((folder / "results").rglob("*.part"))
         failed = err.partition(" points failed")[0].split("\n")[-1]
-        assert failed in [f"{count} of 24" for count in range(1, 24)], failed
+        assert failed in [f"{count} of 12" for count in range(1, 12)], failed
         assert not os.system(f"mount -o remount,size=100m {folder / 'results'}")
         finish(folder, sweep)
-        check_whole(folder, 24, expected)
+        check_whole(folder, 12, expected)
         print(f"full disk: {failed} points failed, and finished once there was room")
     finally:
         os.system(f"umount {folder / 'results'}")
