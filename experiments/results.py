@@ -169,11 +169,11 @@ def _list(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
 def _status(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """States of points, tables and figures, by study."""
     if options.study:
-        yield from study_status(archive, archive.study(options.study))
+        yield from study_status(archive, archive.study(options.study), terminal_width())
         return
     yield from archive.unreadable
     for study in archive.studies.values():
-        yield from study_status(archive, study)
+        yield from study_status(archive, study, terminal_width())
     if not archive.studies:
         yield f"no study in {archive.results}"
 
@@ -181,7 +181,9 @@ def _status(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
 def _show(archive: Archive, options: argparse.Namespace) -> Iterator[str]:
     """All about a point or a study."""
     item = archive.find(options.name)
-    return study_facts(archive, item) if isinstance(item, Study) else point_facts(archive, item)
+    if isinstance(item, Study):
+        return study_facts(archive, item, terminal_width())
+    return point_facts(archive, item)
 
 
 def _diff(archive: Archive, options: argparse.Namespace) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -21,6 +22,7 @@ from experiments.tracking.trees import flatten
 _SHORT = 12  # characters of an identity that are shown; any that are enough can be typed
 _RUN = "python experiments/run.py"
 _OF_SWEEP = ("experiment=", "scale=", "study=", "subject=")  # overrides that a study's sweep needs
+_HANGING = " " * 10  # opens a line that goes on
 _COLUMNS = ("truth", "cells", "actions", "dt", "samples", "seed")
 
 
@@ -92,8 +94,17 @@ def summary_list(points: Sequence[Facts], width: int | None) -> Iterator[str]:
     yield from _folded(rows, width)
 
 
-def study_status(archive: Archive, study: Study) -> Iterator[str]:
-    """A study's points by state, then what is up to date, or shipped as it was made."""
+def study_status(archive: Archive, study: Study, width: int | None) -> Iterator[str]:
+    """A study's points by state, then what is up to date, or shipped as it was made.
+
+    Lines are broken at a width, if one is given.
+    """
+    for line in _status_lines(archive, study):
+        yield from textwrap.wrap(line, width, subsequent_indent=_HANGING) if width else [line]
+
+
+def _status_lines(archive: Archive, study: Study) -> Iterator[str]:
+    """The same, unbroken; figures of which the same is to be said share a line."""
     points = archive.points_of(study)
     counts = count_states(points)
     states = ", ".join(f"{counts[state]} {state}" for state in State if counts[state])
@@ -106,8 +117,11 @@ def study_status(archive: Archive, study: Study) -> Iterator[str]:
     figures, damage = figure_concerns(study, points), note_damage(study.folder)
     if not figures:
         yield f"  figures {damage or 'not drawn'}"
+    alike: dict[str, list[str]] = {}
     for name, concerns in figures.items():
-        yield f"  figure  {name}: {_freshness(concerns, fresh)}"
+        alike.setdefault(_freshness(concerns, fresh), []).append(name)
+    for told, names in alike.items():
+        yield f"  {'figures' if len(names) > 1 else 'figure '} {', '.join(names)}: {told}"
     report = report_note.concerns(study.folder)
     if report is not None:
         yield f"  report  {_freshness(report, fresh)}"
@@ -152,9 +166,9 @@ def _shipped_lines(facts: Facts, archive: Archive) -> Iterator[str]:
             yield f"         to run it: {_RUN} {shlex.join(words)}"
 
 
-def study_facts(archive: Archive, study: Study) -> Iterator[str]:
+def study_facts(archive: Archive, study: Study, width: int | None) -> Iterator[str]:
     """Status, what varies, and what the tables came from."""
-    yield from study_status(archive, study)
+    yield from study_status(archive, study, width)
     values: dict[str, dict[str, None]] = {}
     for overrides in study.points.values():
         for key, _, value in (override.partition("=") for override in overrides):

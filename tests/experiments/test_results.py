@@ -358,6 +358,26 @@ def test_status_is_up_to_date_after_a_sweep(settings: Settings, tmp_path: Path, 
     ]
 
 
+def test_figures_alike_share_a_line_that_fits(
+    settings: Settings, tmp_path: Path, look, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    swept(settings, tmp_path, "s")
+    folder = tmp_path / "s"
+    drawn(folder)
+    data = (folder / "tables" / "trials.csv").read_bytes()
+    notes = {}
+    for name in ("curve", "map"):
+        for suffix in ("png", "pdf", "txt"):
+            (folder / "figures" / f"{name}.{suffix}").write_text("drawn")
+        notes[name] = figure_note(folder / "figures" / name, "rank_curve", {"trials.csv": data})
+    write_note(folder, notes)
+    monkeypatch.setattr("experiments.results.terminal_width", lambda: 30)
+    assert look("status", "s")[1].splitlines()[2:] == [
+        "  figures curve, map: up to",
+        "          date",
+    ]
+
+
 @pytest.mark.parametrize(
     ("harm", "tables", "figure"),
     [
