@@ -159,7 +159,7 @@ def test_a_path_crosses_what_some_chord_of_it_meets():
 
 
 def test_boxes_of_all_sizes_are_found_in_their_buckets():
-    """Against every chord with every box, one dimension of one box at a time."""
+    """Against every chord with every box, one dimension at a time."""
     rng = np.random.default_rng(5)
     lower = rng.uniform([-1, -7, -4], [6, 5, 3], size=(400, 3))
     upper = lower + 10 ** rng.uniform(-3, 0.7, size=(400, 3))
@@ -174,13 +174,12 @@ def test_boxes_of_all_sizes_are_found_in_their_buckets():
     for turns in (-2, -1, 0, 1, 2):
         shift = np.array([turns * TURN, 0.0, 0.0])
         for chord, (start, end) in enumerate(zip(starts + shift, ends + shift, strict=True)):
-            for box in range(400):
-                enter, leave = 0.0, 1.0
-                for d in range(3):
-                    sides = np.array([lower[box, d], upper[box, d]])
-                    times = np.sort((sides - start[d]) / (end[d] - start[d]))
-                    enter, leave = max(enter, times[0]), min(leave, times[1])
-                expected[chord, box] |= enter < leave
+            enter, leave = np.zeros(400), np.ones(400)
+            for d in range(3):
+                sides = np.stack([lower[:, d], upper[:, d]])
+                first, last = np.sort((sides - start[d]) / (end[d] - start[d]), axis=0)
+                enter, leave = np.maximum(enter, first), np.minimum(leave, last)
+            expected[chord] |= enter < leave
     found = region_set.violated_by(np.stack([starts, ends], axis=1))
     assert 500 < np.sum(expected) < 20000
     np.testing.assert_array_equal(found, expected)
