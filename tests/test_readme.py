@@ -59,6 +59,8 @@ SHORT = [
     (r"^(.*run\.py .*)", r"\1 workers=1"),
     # Two hundred simulated demonstrators a command are for the tests of calibration.
     (r"^(?!.*inference)(.*(run|infer)\.py .*)", r"\1 inference.calibrate=false"),
+    # A minute of grids and time steps is for tests/experiments/test_advise.py.
+    (r"^(.*advise\.py)$", r"\1 budget=400 dts=[0.25] pairs=10"),
     # Nor are minutes of sampled paths for the tasks that may be recorded next.
     (r"^(.*model=sampled.*)", r"\1 sampled.samples=200 sampled.restarts=1 next_tasks.count=0"),
 ]

@@ -63,14 +63,14 @@ def test_posterior_is_calibrated_over_simulated_truths() -> None:
     """Draw a truth from the prior, demonstrations from the truth; compare belief and frequency.
 
     Trajectories are rows of a 0/1 table with known probabilities, so that Phi is exact. Over
-    4000 rounds each bin of 100 or more must agree to four standard errors.
+    1500 rounds each bin of 100 or more must agree to four standard errors.
     """
     rng = np.random.default_rng(0)
     trajectories = rng.random((12, 3)) < 0.3  # which of three regions each of 12 paths crosses
     chance = rng.dirichlet(np.ones(12))
     phi = chance @ trajectories
     beliefs, outcomes = [], []
-    for _ in range(4000):
+    for _ in range(1500):
         truth = int(rng.choice(4, p=[0.15, 0.15, 0.2, 0.5]))
         allowed = np.ones(12, dtype=bool) if truth == 3 else ~trajectories[:, truth]
         count = int(rng.integers(0, 6))

@@ -119,17 +119,17 @@ def test_goal_without_winding_is_the_one_nearest_to_the_start():
     rng = np.random.default_rng(5)
     starts = np.stack([rng.uniform(-9, 9, 40), rng.uniform(-1, 1, 40)], axis=1)
     goals = np.stack([rng.uniform(0, 2 * np.pi, 40), np.zeros(40)], axis=1)
-    guesses = np.repeat(rng.choice([-2.0, 2.0], (40, 1, 1)), 500, axis=1)  # over the top
+    guesses = np.repeat(rng.choice([-2.0, 2.0], (40, 1, 1)), 100, axis=1)  # over the top
     turns = {}
     for wind in (True, False):
-        found = optimize(PENDULUM, starts, goals, goals, guesses, DT, wind=wind, iterations=20)
+        found = optimize(PENDULUM, starts, goals, goals, guesses, 0.05, wind=wind, iterations=20)
         way = found.states[:, -1, 0] - starts[:, 0]
         nearest = np.mod(goals[:, 0] - starts[:, 0] + np.pi, 2 * np.pi) - np.pi
         reached = np.linalg.norm(found.excess, axis=1) < 0.05
         assert np.mean(reached) > 0.7
         turns[wind] = np.abs(way - nearest)[reached] / (2 * np.pi)
         np.testing.assert_allclose(turns[wind], np.round(turns[wind]), atol=0.01)
-        ends = np.sum(found.controls**2, axis=(1, 2)) * DT + 300 * np.sum(found.excess**2, axis=1)
+        ends = np.sum(found.controls**2, axis=(1, 2)) * 0.05 + 300 * np.sum(found.excess**2, axis=1)
         np.testing.assert_allclose(found.cost, ends)
     assert np.max(turns[False]) < 0.01
     assert np.mean(turns[True] > 0.5) > 0.2
@@ -165,7 +165,7 @@ def swing_effort():
 
 
 def test_swing_costs_what_pontryagin_says(swing_effort):
-    found = solve_one(PENDULUM, [0.5, 0], [3, 0], np.zeros((500, 1)), iterations=60)
+    found = solve_one(PENDULUM, [0.5, 0], [3, 0], np.zeros((500, 1)), iterations=30)
     assert np.sum(found.controls**2) * DT == pytest.approx(swing_effort, rel=0.01)
     assert np.linalg.norm(found.states[0, -1] - [3, 0]) < 0.05
     applied = rollout(PENDULUM, [0.5, 0], found.controls[0], DT, step=euler_step)
@@ -395,13 +395,13 @@ def safety_filter():
 
 def test_cost_never_rises_and_no_member_sees_another(safety_filter):
     rng = np.random.default_rng(2)
-    starts, goals = rng.uniform([0, -2], [2 * np.pi, 2], (2, 5, 2))
-    guesses = held_controls(rng, 5, 5, 60)
+    starts, goals = rng.uniform([0, -2], [2 * np.pi, 2], (2, 3, 2))
+    guesses = held_controls(rng, 3, 5, 40)
     options = {"safety_filter": safety_filter, "iterations": 8}
     together = optimize(PENDULUM, starts, goals, goals, guesses, DT, **options)
     assert np.all(np.diff(together.costs, axis=0) <= 0)
     assert np.median(together.costs[-1] / together.costs[0]) < 0.05
-    for b in range(5):
+    for b in range(3):
         alone = solve_one(PENDULUM, starts[b], goals[b], guesses[b], **options)
         np.testing.assert_allclose(alone.states[0], together.states[b], atol=1e-9)
         np.testing.assert_allclose(alone.controls[0], together.controls[b], atol=1e-9)

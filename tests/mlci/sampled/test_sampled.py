@@ -22,7 +22,7 @@ from mlci.tabular import action_grid, discretize
 PENDULUM = Pendulum()
 CELLS = Regions.from_grid(PENDULUM.space, (10, 10))
 MODEL = SampledModel(PENDULUM, CELLS, 0.25, samples=800, restarts=3)
-TASK = Task(np.array([0.5, 0.0]), Box([2.9, -0.2], [3.1, 0.2]), 5.0)
+TASK = Task(np.array([0.5, 0.0]), Box([2.9, -0.2], [3.1, 0.2]), 3.0)
 
 
 def linear_scores(tasks: int, seed: int, exact_samples: int) -> tuple[Floats, Floats, Floats]:
@@ -174,8 +174,8 @@ def test_a_model_and_tasks_that_cannot_be_are_refused():
     with pytest.raises(ValueError, match=r"SampledModel\.samples must be positive: 0"):
         replace(MODEL, samples=0)
     with pytest.raises(ValueError, match="does not divide the horizon"):
-        MODEL.distribution(replace(TASK, horizon=5.1))
-    assert MODEL.passage(replace(TASK, horizon=5.1), round_horizon=True).steps == 20
+        MODEL.distribution(replace(TASK, horizon=3.1))
+    assert MODEL.passage(replace(TASK, horizon=3.1), round_horizon=True).steps == 12
 
 
 def test_what_needs_cells_says_so_of_a_model_without_them():
