@@ -89,6 +89,7 @@ def run_command(
     from experiments.config.command_line import command_words
     from experiments.config.explain import explain, of_config
     from experiments.config.paths import CONF
+    from experiments.config.quick_yaml import read_yaml_in_c
     from experiments.config.read import ConfigError, plain_tree
     from experiments.terminal import complain
 
@@ -111,16 +112,17 @@ def run_command(
             raise SystemExit(status)
 
     def composed(words: list[str]) -> DictConfig | None:
-        """The config, composed once; None if it asks for a sweep, or Hydra says what is wrong."""
+        """The config, composed once; None if it asks for a sweep, or may ask for one."""
         try:
             with hydra.initialize_config_dir(str(CONF), **version_base()):
                 config = hydra.compose(config_name, words, return_hydra_config=True)
-        except Exception:
-            if register_sweeper is None:
+        except Exception as error:
+            if register_sweeper is None or "--multirun" not in str(error):
                 raise
-            return None
+            return None  # several values of a key
         return None if config.hydra.mode is RunMode.MULTIRUN else config
 
+    read_yaml_in_c()
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra raises its errors, and they are worded here
     try:
         sys.argv[1:] = words = command_words(sys.argv[1:])

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from tiny_point import TINY, composed
 
+from experiments.config.quick_yaml import read_yaml_in_c
 from experiments.config.read import read_config
 from experiments.config.settings import Settings
 
@@ -19,7 +20,8 @@ sys.dont_write_bytecode = False
 
 
 def pytest_collection_finish() -> None:
-    """Garbage is looked for as seldom as in our commands, and not in what was collected."""
+    """As in our commands: YAML is read in C, and garbage looked for seldom, not in what is here."""
+    read_yaml_in_c()
     gc.set_threshold(50_000)
     gc.freeze()
 

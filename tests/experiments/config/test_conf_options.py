@@ -61,11 +61,13 @@ def _subject_of(group: str, name: str) -> list[str]:
 
 @pytest.mark.parametrize("option", OPTIONS)
 def test_every_option_makes_a_point_that_can_run(option: str) -> None:
-    read_config(plain_tree(composed(option, *companions(option))))
+    _, study = read_config(plain_tree(composed(option, *companions(option))))
+    group, _, name = option.partition("=")
+    if group == "experiment":
+        assert study.study == name
     if option.startswith(("system=", "truth=", "grid=")):
         # What the file says is what the point gets.
         content = yaml.safe_load(OPTIONS[option].read_text())
-        group = option.partition("=")[0]
         given = content.get(group, content)
         found = plain_tree(composed(option, *companions(option)))[group]
         assert {key: found[key] for key in given} == given

@@ -14,7 +14,7 @@ from typing import NoReturn
 from unittest import mock
 
 import pytest
-from sweeps import faulty, gone, run, run_here, running, start, tables
+from sweeps import faulty, gone, run_here, running, start, tables
 
 from experiments.app import REFUSED
 from experiments.config.read import ConfigError
@@ -68,7 +68,7 @@ def test_tables_are_written_again_only_if_they_would_change(tmp_path: Path) -> N
 
 
 def test_single_run_shows_its_log_again_when_it_was_finished(tmp_path: Path) -> None:
-    status, first, _ = run(tmp_path)
+    status, first, _ = run_here(tmp_path)
     assert status == 0
     assert "written: " in first
     status, second, _ = run_here(tmp_path, "study=another")
@@ -226,7 +226,9 @@ def test_forced_point_runs_again(tmp_path: Path) -> None:
     assert tables(tmp_path, "points") == before
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "stop", [signal.SIGINT, pytest.param(signal.SIGHUP, marks=pytest.mark.long)]
+)
 def test_stopped_sweep_keeps_what_finished_and_leaves_no_process(
     stop: signal.Signals, tmp_path: Path
 ) -> None:
