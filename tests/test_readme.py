@@ -98,7 +98,7 @@ def run_commands(example: Example) -> None:
             done = run_here(MAINS[words[1]], *words[2:], folder=Path.cwd())
         else:
             done = subprocess.run(
-                ["bash", "-c", command], capture_output=True, text=True, timeout=60
+                ["bash", "-c", command], capture_output=True, text=True, timeout=600
             )
         assert done.returncode == 0, f"{example.path}, line {example.line}, {line}:\n{done.stderr}"
 

@@ -1,4 +1,4 @@
-"""YAML that OmegaConf reads in C: a config is composed from thirty files, a third sooner so."""
+"""YAML that OmegaConf reads in C: a config comes from thirty files, and takes a third less time so."""
 
 from __future__ import annotations
 

@@ -237,7 +237,7 @@ def test_an_answer_that_nobody_reads_on_is_saved(recorded: Path) -> None:
         cwd=recorded,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},  # so that the first line finds no reader
         capture_output=True,
-        timeout=60,
+        timeout=600,
     )
     assert not done.stderr
     assert {file.name for file in saved(recorded).iterdir()} >= {"answer.json", "page.html"}

@@ -19,7 +19,7 @@ print('hydra14.sh: hydra-core', version('hydra-core'), 'and omegaconf', version(
 # What is asked of Hydra, composing and starting, is in these. Other tests ask it for the settings of a
 # point at most, which are compared here.
 # Hydra 1.4 lets no composed file set the mode: there a study is run with -m, or refused in words.
-PYTHONWARNINGS=error "$work/venv/bin/python" -m pytest -p no:cacheprovider -n 2 --dist worksteal \
+PYTHONWARNINGS=error "$work/venv/bin/python" -m pytest -p no:cacheprovider \
     --deselect tests/experiments/sweep/test_planner.py::test_study_without_m_says_first_how_many_points_will_run \
     tests/experiments/config tests/experiments/sweep tests/experiments/test_infer.py
 "$work/venv/bin/python" -W error experiments/run.py -m experiment=paper scale=smoke \

@@ -2,4 +2,4 @@
 # The tests that take many seconds each: whole processes, clusters, and the slowest oracles.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-.venv/bin/python -m pytest -m long -n logical --dist worksteal
+.venv/bin/python -m pytest -m long

@@ -62,7 +62,7 @@ def test_a_cluster_in_this_process_is_reached_from_this_machine_alone() -> None:
     client = dask_jobs.DaskLauncher(1, None, 1, fail_fast=False)._client()
     try:
         opened = listening() - before
-        assert client.submit(sum, [1, 2]).result(timeout=30) == 3
+        assert client.submit(sum, [1, 2]).result(timeout=600) == 3
         assert {address for address, _ in opened} <= {"0100007F"}
     finally:
         client.close()

@@ -166,7 +166,7 @@ def test_a_queue_that_never_answers_is_given_up(
 ) -> None:
     for name in ("squeue", "scancel"):
         (tmp_path / "bin" / name).write_text(f"#!{sys.executable}\n{code}\n")
-    monkeypatch.setattr(slurm, "_ANSWER", 0.2)
+    monkeypatch.setattr(slurm, "_ANSWER", 1.0 if "sleep" in code else 60.0)
     monkeypatch.setattr(slurm, "_SILENCE", 0.3)
     slurm.SlurmLauncher(1, 0.05, False, cpus_per_task=1)._wait(["7_0"])
     slurm._cancel(["7_0", "7_1"])
