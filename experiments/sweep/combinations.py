@@ -68,7 +68,7 @@ class Combinations:
         params: values that are swept, by key: "1,2,3"; None for no key.
         settings: lists of overrides; None for a single one without any.
         cases: names with overrides; None for a single one without a name.
-        ends: of several values take the first and the last only, and note that.
+        ends: of several values take the first and the last only, of seeds the first, and note that.
         notes: what a reader has to know of the combinations, once they are listed.
     """
 
@@ -150,14 +150,15 @@ class Combinations:
 
     def _study_values(self, override: Override) -> list[str]:
         """What a study gives a key, or the ends of it; notes what the ends stand for."""
-        values = _values(override)
-        if self.ends and len(values) > 2:
-            every = ", ".join(swept_texts(override))
-            first, *_, last = swept_texts(override)
-            key = override.get_key_element()
-            self.notes.append(f"{key}: {first} and {last} stand for all of {every}")
-            values = [values[0], values[-1]]
-        return values
+        values, key = _values(override), override.get_key_element()
+        ends = [0] if key == "seed" else [0, -1]  # a seed stands for any other
+        if not self.ends or len(values) <= len(ends):
+            return values
+        texts = swept_texts(override)
+        shown, all_of = " and ".join(texts[i] for i in ends), ", ".join(texts)
+        stand = "stands" if len(ends) == 1 else "stand"
+        self.notes.append(f"{key}: {shown} {stand} for all of {all_of}")
+        return [values[i] for i in ends]
 
 
 def read_cases(settings: object, cases: object) -> list[Case]:

@@ -28,7 +28,7 @@ OPTIONS = {
 }
 # What the smoke scale may set: numbers of trials, the horizon, and the study that the tables go to.
 SMALLER = {"study", "horizon", "rollouts", "demonstrations", "ranks"}
-SMALLER |= {"next_task", "soft", "transfer", "resolution", "sampled", "models"}
+SMALLER |= {"next_task", "soft", "transfer", "resolution", "sampled", "models", "areas"}
 
 
 @functools.cache  # each takes a tenth of a second
