@@ -45,6 +45,7 @@ _NOT_SWEPT = {
         "this changes no result, so give it one value only",
     ),
 }
+_LISTED = 10  # values that a note tells one by one
 
 
 @dataclass(frozen=True)
@@ -155,9 +156,9 @@ class Combinations:
         if not self.ends or len(values) <= len(ends):
             return values
         texts = swept_texts(override)
-        shown, all_of = " and ".join(texts[i] for i in ends), ", ".join(texts)
-        stand = "stands" if len(ends) == 1 else "stand"
-        self.notes.append(f"{key}: {shown} {stand} for all of {all_of}")
+        shown, stand = " and ".join(texts[i] for i in ends), "stands" if len(ends) == 1 else "stand"
+        few = texts if len(texts) <= _LISTED else [*texts[:3], "...", texts[-1]]
+        self.notes.append(f"{key}: {shown} {stand} for all of {', '.join(few)}")
         return [values[i] for i in ends]
 
 

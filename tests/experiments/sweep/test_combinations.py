@@ -108,6 +108,8 @@ def test_ends_stand_for_all_values_of_a_study_and_say_so() -> None:
     assert len(points) == 2 * 3 * 2 + 2
     assert points[0] == "dt=1 horizon=1 case='a' seed=4"
     assert listed(params={"dt": "1,2"}, ends=True) == ["dt=1", "dt=2"]
+    many = listed(params={"seed": "range(0,100)"}, ends=True)
+    assert many == ["seed=0", "seed: 0 stands for all of 0, 1, 2, ..., 99"]
 
 
 @pytest.mark.parametrize(
