@@ -25,7 +25,7 @@ from mlci.zoo.planar_point import PlanarPoint
 
 PLANE = PlanarPoint(position_limit=50.0)
 GOAL = Box([1.4, -0.1], [1.6, 0.1])
-DISC = Regions.from_shapes(PLANE.space, [Ball([0.0, 0.0], 0.6), Ball([0.0, 2.0], 0.5)])
+DISC = Regions.from_shapes(PLANE.space, [Ball([0.0, 0.0], 0.6), Ball([0.0, 1.0], 0.3)])
 ACROSS = Task(np.array([-1.5, 0.0]), GOAL, 3.0)
 MODEL = SampledModel(PLANE, DISC, 0.25, 0.3)
 PENDULUM = Pendulum()
@@ -70,8 +70,11 @@ def test_a_disc_in_the_way_leaves_the_bridges_log_z_and_half_the_paths_on_each_s
     assert abs(np.sum(under.weight[upper]) - 0.5) < 3 * half
     # The other disc is entered as often as by exact paths that keep out of the first.
     entered = DISC.violated_by(paths)
-    exact = np.mean(entered[~entered[:, 0], 1])
-    assert abs(under.violation_probabilities()[1] - exact) < 3 * under.avoidance_errors()[1]
+    others = entered[~entered[:, 0], 1]
+    exact, error = np.mean(others), np.std(others) / np.sqrt(len(others))
+    assert exact > 0.1
+    error = np.hypot(error, under.avoidance_errors()[1])
+    assert abs(under.violation_probabilities()[1] - exact) < 3 * error
 
 
 def test_an_integrator_goes_round_as_its_bridge_does():
