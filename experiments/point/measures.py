@@ -122,9 +122,10 @@ def _of_cells(
 @_under_truth.register
 def _of_samples(model: SampledModel, settings: Settings, point: PointInference) -> _UnderTruth:
     feasible = np.zeros(len(point.demonstrations), dtype=bool)
+    model = model.under(point.truth)
     phi, error = [], []
     for j, demonstration in enumerate(point.demonstrations):
-        distribution = model.distribution(demonstration.task).under(point.truth)
+        distribution = model.distribution(demonstration.task)
         if distribution.diagnosis.effective < _FEWEST_EFFECTIVE:
             continue
         feasible[j] = True

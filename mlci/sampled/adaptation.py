@@ -3,7 +3,8 @@
 Round the modes policies are exact where the system is linear. Elsewhere a few rounds of
 cross-entropy (Rubinstein 1999; with mixtures, Cappe, Douc, Guillin, Marin and Robert 2008) fit them
 to the paths of a pilot, in the directions where the density is not Gaussian. Where a pilot misses
-the goal, the refit takes a wider goal; where few paths carry the weight, flatter weights.
+the goal, the refit takes a wider goal; where few paths carry the weight, flatter weights; and where
+a pilot enters a truth, the paths that enter it least.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 import scipy  # loads scipy.special when it is first used
 
+from mlci.sampled.detours import Detours
 from mlci.sampled.local_policies import LocalPolicies, refit, riccati_policies
 from mlci.sampled.modes import Modes
 from mlci.sampled.passage import Passage
@@ -25,10 +27,16 @@ _FEWEST, _MOST = 2, 6  # rounds
 _ENOUGH = 0.25  # effective share of the samples, from which a round more is not worth its time
 NEEDED = 20  # effective samples for each coefficient of a refit
 _IN_GOAL = 0.05  # of a pilot is in the goal, or a wider one takes its place
+_KEEP_OUT = 0.1  # of a pilot keeps out of a truth, or the paths that enter it least do in its place
 
 
 def adapted_proposal(
-    passage: Passage, modes: Modes, samples: int, pilot: int, rng: np.random.Generator
+    passage: Passage,
+    modes: Modes,
+    samples: int,
+    pilot: int,
+    rng: np.random.Generator,
+    detours: Detours | None = None,
 ) -> tuple[Proposal, int]:
     """A proposal of some samples, fitted on pilots, and how many rounds of these there were.
 
@@ -38,15 +46,21 @@ def adapted_proposal(
         samples: of the proposal.
         pilot: samples of each round.
         rng: draws the pilots.
+        detours: a truth that paths keep out of; the modes are its.
     """
     needed = NEEDED * (1 + len(passage.start))
-    first, log_integral = riccati_policies(passage, modes)
-    latest, shares = first, scipy.special.softmax(log_integral)
+    if detours:
+        first, shares = detours.policies, np.full(len(modes), 1 / len(modes))
+    else:
+        first, log_integral = riccati_policies(passage, modes)
+        shares = scipy.special.softmax(log_integral)
+    latest = first
     for number in range(1, _MOST + 1):
         proposal = _mixture(first, latest, shares, pilot)
         draws = draw(passage, proposal, rng)
-        log_weight = np.where(draws.reached, draws.log_weight, -np.inf)
-        weight = flattened(draws, needed, np.ones(len(log_weight), dtype=bool))
+        depth = detours.depth(draws.paths) if detours else np.zeros(len(draws.paths))
+        log_weight = np.where(draws.reached & (depth == 0), draws.log_weight, -np.inf)
+        weight = flattened(draws, needed, depth <= np.quantile(depth, _KEEP_OUT))
         latest = refit(
             latest,
             draws.paths[:, : -1 : passage.substeps],

@@ -20,14 +20,16 @@ from numpy.typing import ArrayLike
 from mlci.regions import Regions, as_mask
 from mlci.sampled import weights
 from mlci.sampled.adaptation import adapted_proposal
+from mlci.sampled.detours import Detours, find_detours, softened
 from mlci.sampled.diagnosis import SamplingDiagnosis
 from mlci.sampled.modes import Modes
 from mlci.sampled.passage import Passage
 from mlci.sampled.proposals import Proposal, draw
 from mlci.spaces import Bools, Floats, Ints
 
-SEARCH, _DRAWS, _REPLICATES = range(3)  # a generator each, so that none depends on another
+SEARCH, _DRAWS, _REPLICATES, _ROUND = range(4)  # a generator each, so that none depends on another
 _PILOT = 1000  # samples of a pilot at least, if there are so many of the task
+_BLOCKED = 0.5  # of the probability keeps out of a truth, below which paths are drawn anew
 _PAIRS_AT_ONCE = 4_000_000  # of paths and regions
 
 
@@ -153,7 +155,8 @@ class SampledDistribution:
     def under(self, truth: ArrayLike) -> SampledDistribution:
         """The distribution under constraints, equation (3): paths that cross the truth weigh 0.
 
-        Its diagnosis tells how few paths are left. Nothing is drawn anew.
+        Its diagnosis tells how few paths are left. Nothing is drawn anew: `SampledModel.under` is
+        for a truth that is in the way.
 
         Args:
             truth: (C,) mask over the regions.
@@ -198,21 +201,27 @@ def sample_passage(
     modes: Modes,
     samples: int,
     key: tuple[int, ...],
+    detours: Detours | None = None,
 ) -> SampledDistribution:
-    """Weighted paths of a passage, from policies round its modes; the key seeds the draws."""
+    """Weighted paths of a passage, from policies round its modes; the key seeds the draws.
+
+    With detours only those that keep out of their truth have weight, equation (3).
+    """
     rng = np.random.default_rng([*key, _DRAWS])
-    free = np.zeros(len(regions), dtype=bool)
+    truth = np.zeros(len(regions), dtype=bool)
     if not len(modes):
         nothing, paths = np.zeros(0), np.zeros((0, 2, len(passage.start)))
         none = nothing, nothing.astype(bool), nothing.astype(np.int64)
         diagnosis = SamplingDiagnosis(0, 0.0, 0.0, np.inf, nothing, 0.0, 0)
-        of_nothing = paths, *none, -np.inf, np.inf, diagnosis, key, free
+        of_nothing = paths, *none, -np.inf, np.inf, diagnosis, key, truth
         return SampledDistribution(passage, regions, modes, None, *of_nothing)
     pilot = max(min(samples, _PILOT), samples // 3)
-    proposal, rounds = adapted_proposal(passage, modes, samples, pilot, rng)
+    proposal, rounds = adapted_proposal(passage, modes, samples, pilot, rng, detours)
     draws = draw(passage, proposal, rng)
-    log_weight = np.where(draws.reached, draws.log_weight, -np.inf)
-    count, reached = len(log_weight), draws.reached
+    reached = draws.reached
+    if detours:
+        reached = reached & (detours.depth(draws.paths) == 0)
+    log_weight, count = np.where(reached, draws.log_weight, -np.inf), len(reached)
     log_total = float(scipy.special.logsumexp(log_weight))
     weight = np.exp(log_weight - log_total) if reached.any() else np.zeros(count)
     probability = weight @ draws.mode_share
@@ -228,5 +237,35 @@ def sample_passage(
     error = float(weights.sum_error(weights.deviations(weight, draws.component)))
     return SampledDistribution(
         *(passage, regions, modes, proposal, draws.paths[reached], weight[reached], reached),
-        *(draws.component, log_total - np.log(count), error, diagnosis, key, free),
+        *(draws.component, log_total - np.log(count), error, diagnosis, key, truth),
     )
+
+
+def under_truth(
+    free: SampledDistribution, truth: Bools, samples: int, restarts: int
+) -> SampledDistribution:
+    """The distribution under a truth (C,), equation (3), drawn anew where the truth is in the way.
+
+    Where it is not, the paths that keep out are enough: their density is at most 1 / alpha times
+    the one that they are drawn by.
+
+    Args:
+        free: the distribution without the truth.
+        truth: regions that know their distance.
+        samples: paths that are drawn.
+        restarts: first guesses of the optimiser for each winding.
+    """
+    under = free.under(truth)
+    if free.proposal is None or not free.is_possible:
+        return under
+    regions = free.regions.select(truth)
+    is_blocked = under.log_z - free.log_z < np.log(_BLOCKED)
+    if not is_blocked or regions.signed_distance(free.passage.start) < 0:
+        return under
+    key = (*free.key, _ROUND)
+    rng = np.random.default_rng([*key, SEARCH])
+    soft = softened(free.passage, regions, free.paths, free.weight)
+    modes, policies = find_detours(free.passage, free.modes, free.proposal, soft, restarts, rng)
+    detours = Detours(regions, modes, policies)
+    anew = sample_passage(free.passage, free.regions, modes, samples, key, detours)
+    return replace(anew, truth=truth)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mlci.demonstrations import REACHED, Task
-from mlci.regions import Regions
-from mlci.sampled.distribution import SEARCH, SampledDistribution, sample_passage
+from mlci.regions import Regions, as_mask
+from mlci.sampled.distribution import SEARCH, SampledDistribution, sample_passage, under_truth
 from mlci.sampled.model_check import check_model
 from mlci.sampled.modes import Modes, find_modes_of
 from mlci.sampled.passage import Passage
 from mlci.simulate import step_count
-from mlci.spaces import Box
+from mlci.spaces import Bools, Box
 from mlci.systems import System
 
 ROUNDED_TIMES = 1e-3  # of a time step: how far a horizon may be off, as recorded times are rounded
@@ -37,10 +38,11 @@ class SampledModel:
         tolerance: half width of the goal in the dimensions in which it is a point.
         limit: range of the controls, such as the system's control box; None for none.
         replicates: of probabilities, from which errors of a ranking are told.
+        truth: (C,) mask of the regions that no path may enter, see `under`; none by default.
 
     Raises:
         ValueError: a number that is not positive, or not whole where it counts something; regions
-            or a limit of another dimension, or a limit without width.
+            or a limit of another dimension, a limit without width, or a truth of other regions.
     """
 
     system: System
@@ -54,9 +56,34 @@ class SampledModel:
     tolerance: float = REACHED
     limit: Box | None = None
     replicates: int = 200
+    truth: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
+        if not np.any(self.truth):  # of these regions, or of others that they replace
+            object.__setattr__(self, "truth", np.zeros(len(self.regions), dtype=bool))
+        as_mask(self.truth, len(self.regions))
         check_model(self)
+
+    def under(self, truth: ArrayLike) -> SampledModel:
+        """The model under constraints, equation (3): paths that enter the truth weigh 0.
+
+        Where few paths of a task keep out, ways round the truth are looked for, and paths drawn
+        round these.
+
+        Args:
+            truth: (C,) mask over the regions, such as `model.regions.mask(["c1"])`.
+
+        Raises:
+            ValueError: a truth that knows no distance, such as a predicate without a steepness.
+        """
+        mask = as_mask(truth, len(self.regions))
+        for number in np.flatnonzero(mask).tolist():
+            if not self.regions.shape(number).has_distance:
+                raise ValueError(
+                    f"region {self.regions.names[number]} knows what is inside, but not how far "
+                    "away it is, by which ways round it are found: give its `steepness`"
+                )
+        return replace(self, truth=self.truth | mask)
 
     def passage(self, task: Task, *, round_horizon: bool = False) -> Passage:
         """The random motion of a task.
@@ -101,9 +128,12 @@ class SampledModel:
                 self._key(passage, task)
                 for passage, task in zip(block, tasks[first : first + _AT_ONCE], strict=True)
             ]
-            found = self._modes(block, keys)
-            for passage, key, modes in zip(block, keys, found, strict=True):
-                yield sample_passage(passage, self.regions, modes, self.samples, key)
+            ways = self._modes(block, keys)
+            for passage, key, modes in zip(block, keys, ways, strict=True):
+                found = sample_passage(passage, self.regions, modes, self.samples, key)
+                if self.truth.any():
+                    found = under_truth(found, self.truth, self.samples, self.restarts)
+                yield found
 
     def _key(self, passage: Passage, task: Task) -> tuple[int, ...]:
         """What seeds the generators of a task."""

@@ -27,7 +27,7 @@ _ITERATIONS = 60
 _TOLERANCE = 1e-6  # of a cost; the policy round a way corrects for what is left
 _TURNS = 6  # windings on each side are looked at no further
 
-_Ways = tuple[Floats, Floats, Floats, Floats]  # states, controls, goals and costs of first guesses
+Ways = tuple[Floats, Floats, Floats, Floats]  # states, controls, goals and costs of first guesses
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +63,11 @@ class Modes:
     def __len__(self) -> int:
         return len(self.cost)
 
+    def joined(self, other: Modes) -> Modes:
+        """These ways, then the other's."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Modes(*(np.concatenate(pair) for pair in pairs))
+
 
 def find_modes(passage: Passage, restarts: int, rng: np.random.Generator) -> Modes:
     """The locally optimal ways of a passage.
@@ -91,7 +96,7 @@ def find_modes_of(
     """
     if len({_shared(passage) for passage in passages}) > 1:
         raise ValueError("passages whose modes are looked for at once have goals of other widths")
-    found: list[list[_Ways]] = [[] for _ in passages]
+    found: list[list[Ways]] = [[] for _ in passages]
     rings = [_rings(passage) for passage in passages]
     going = [(i, turns) for i, ring in enumerate(rings) for turns in itertools.islice(ring, 1)]
     while going:
@@ -108,7 +113,7 @@ def find_modes_of(
         near = [i for i in numbers if not float(np.min(found[i][-1][-1])) > best[i] + _CUT]
         going = [(i, turns) for i in near for turns in itertools.islice(rings[i], 1)]
     return [
-        _distinct(passage, restarts, *map(np.concatenate, zip(*ways, strict=True)))
+        _first_distinct(passage, restarts, ways)
         for passage, ways in zip(passages, found, strict=True)
     ]
 
@@ -139,24 +144,32 @@ def _solve(
     turns: Sequence[Floats],
     restarts: int,
     rngs: Sequence[np.random.Generator],
-) -> list[_Ways]:
+) -> list[Ways]:
     """What the optimiser makes of first guesses towards some windings (L, n) of each passage."""
-    passage, system = passages[0], passages[0].system
-    per_hold, widths = max(1, round(_HOLD / passage.dt)), system.space.bounds.widths
+    passage, box = passages[0], passages[0].system.control_box
+    per_hold, widths = max(1, round(_HOLD / passage.dt)), passage.system.space.bounds.widths
     goals, guesses = list[Floats](), list[Floats]()
     for each, windings, rng in zip(passages, turns, rngs, strict=True):
         goals.append(np.repeat(each.nearest_goal + windings * widths, restarts, axis=0))
         count = len(goals[-1])
-        guesses.append(first_guesses(rng, system.control_box, passage.steps, per_hold, count))
-        guesses[-1][::restarts] = (system.control_box.lower + system.control_box.upper) / 2
-    counts, ends = [len(each) for each in goals], np.concatenate(goals)
+        guesses.append(first_guesses(rng, box, passage.steps, per_hold, count))
+        guesses[-1][::restarts] = (box.lower + box.upper) / 2
+    counts = [len(each) for each in goals]
+    starts = np.repeat([each.start for each in passages], counts, axis=0)
+    of_all = improve(passage, starts, np.concatenate(goals), np.concatenate(guesses))
+    parts = [np.split(each, np.cumsum(counts)[:-1]) for each in of_all]
+    return list(zip(*parts, strict=True))
+
+
+def improve(passage: Passage, starts: Floats, goals: Floats, guesses: Floats) -> Ways:
+    """What the optimiser makes of first guesses (B, T, m) from starts to goals (B, n)."""
     free = np.isinf(passage.half)
     solution = optimize(
-        Unrolled(system),
-        np.repeat([each.start for each in passages], counts, axis=0),
-        np.where(free, -np.inf, ends),
-        np.where(free, np.inf, ends),
-        np.concatenate(guesses),
+        Unrolled(passage.system),
+        starts,
+        np.where(free, -np.inf, goals),
+        np.where(free, np.inf, goals),
+        guesses,
         passage.dt,
         goal_weight=1.0,
         goal_scale=np.sqrt(passage.goal_price(GOAL_SHARE)),
@@ -165,18 +178,20 @@ def _solve(
         limit=passage.limit,
         integrator=passage.integrator,
     )
-    of_all = solution.states, solution.controls, ends, solution.cost / passage.temperature
-    parts = [np.split(each, np.cumsum(counts)[:-1]) for each in of_all]
-    return list(zip(*parts, strict=True))
+    return solution.states, solution.controls, goals, solution.cost / passage.temperature
 
 
-def _distinct(
-    passage: Passage, restarts: int, states: Floats, controls: Floats, goals: Floats, cost: Floats
-) -> Modes:
-    """The ways (B, ...) that are not too dear, equal ones merged into the cheapest of them.
+def _first_distinct(passage: Passage, restarts: int, parts: Sequence[Ways]) -> Modes:
+    """The distinct ways of guesses of which each winding has some, one after the other."""
+    states, controls, goals, cost = map(np.concatenate, zip(*parts, strict=True))
+    number = np.arange(len(cost))
+    is_late = number % restarts >= restarts / 2
+    return distinct(passage, Modes(states, controls, goals, cost, np.ones_like(number), is_late))
 
-    Of the guesses for each winding there are some restarts, one after the other.
-    """
+
+def distinct(passage: Passage, ways: Modes) -> Modes:
+    """The ways that are not too dear, in order, equal ones merged into the cheapest of them."""
+    controls, cost = ways.controls, ways.cost
     deviation = passage.temperature / (2 * passage.dt)
     numbers: list[int] = []
     counts: list[int] = []
@@ -184,20 +199,19 @@ def _distinct(
     for way in np.argsort(cost, kind="stable").tolist():
         if not cost[way] <= np.min(cost) + _CUT or cost[way] == np.inf:
             break
-        is_late = way % restarts >= restarts / 2
         apart = controls[numbers] - controls[way]
         near = np.flatnonzero(np.sum(np.square(apart), axis=(1, 2)) < _SAME * deviation)
         if len(near):
-            counts[near[0]] += 1
-            late[near[0]] &= is_late
+            counts[near[0]] += int(ways.restarts[way])
+            late[near[0]] &= bool(ways.late[way])
         else:
             numbers.append(way)
-            counts.append(1)
-            late.append(is_late)
+            counts.append(int(ways.restarts[way]))
+            late.append(bool(ways.late[way]))
     return Modes(
-        states=states[numbers],
+        states=ways.states[numbers],
         controls=controls[numbers],
-        goals=goals[numbers],
+        goals=ways.goals[numbers],
         cost=cost[numbers],
         restarts=np.array(counts, dtype=np.int64),
         late=np.array(late, dtype=bool),
