@@ -251,12 +251,14 @@ def under_truth(
 
     Args:
         free: the distribution without the truth.
-        truth: regions that know their distance.
+        truth: (C,) mask; where one of its regions knows no distance nothing is drawn anew.
         samples: paths that are drawn.
         restarts: first guesses of the optimiser for each winding.
     """
     under = free.under(truth)
     if free.proposal is None or not free.is_possible:
+        return under
+    if not all(free.regions.shape(i).has_distance for i in np.flatnonzero(truth).tolist()):
         return under
     regions = free.regions.select(truth)
     is_blocked = under.log_z - free.log_z < np.log(_BLOCKED)

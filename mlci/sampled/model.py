@@ -68,21 +68,13 @@ class SampledModel:
         """The model under constraints, equation (3): paths that enter the truth weigh 0.
 
         Where few paths of a task keep out, ways round the truth are looked for, and paths drawn
-        round these.
+        round these; but of a truth that knows no distance, such as a predicate without a steepness,
+        paths that keep out are all that is left.
 
         Args:
             truth: (C,) mask over the regions, such as `model.regions.mask(["c1"])`.
-
-        Raises:
-            ValueError: a truth that knows no distance, such as a predicate without a steepness.
         """
         mask = as_mask(truth, len(self.regions))
-        for number in np.flatnonzero(mask).tolist():
-            if not self.regions.shape(number).has_distance:
-                raise ValueError(
-                    f"region {self.regions.names[number]} knows what is inside, but not how far "
-                    "away it is, by which ways round it are found: give its `steepness`"
-                )
         return replace(self, truth=self.truth | mask)
 
     def passage(self, task: Task, *, round_horizon: bool = False) -> Passage:

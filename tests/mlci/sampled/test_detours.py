@@ -77,6 +77,7 @@ def test_a_disc_in_the_way_leaves_the_bridges_log_z_and_half_the_paths_on_each_s
     assert abs(under.violation_probabilities()[1] - exact) < 3 * error
 
 
+@pytest.mark.long
 def test_an_integrator_goes_round_as_its_bridge_does():
     passage = Passage(
         *(WIDE, np.array([-1.5, 1.0]), Box([1.4, 0.9], [1.6, 1.1]), 12, 0.25, 0.3), substeps=4
@@ -108,6 +109,7 @@ def pendulum_shares(cells: int) -> tuple[float, SampledModel, Task]:
     return log_alpha, SampledModel(PENDULUM, truth, 0.25, limit=wide), task
 
 
+@pytest.mark.long
 def test_a_pendulum_goes_round_c1_as_on_a_grid():
     log_alpha, model, task = pendulum_shares(cells=120)
     free, under = model.distribution(task), model.under([True]).distribution(task)
@@ -154,12 +156,15 @@ def test_a_goal_inside_the_truth_is_impossible():
     assert inside.log_z == -np.inf
 
 
-def test_a_truth_that_knows_no_distance_says_what_to_give():
+def test_of_a_truth_that_knows_no_distance_paths_that_keep_out_are_left():
     shape = Predicate(lambda states: states[..., 0] ** 2 + states[..., 1] ** 2 < 1)
-    model = replace(MODEL, regions=Regions.from_shapes(PLANE.space, [shape], ["round"]))
-    with pytest.raises(ValueError, match=r"region round knows .* give its `steepness`"):
-        model.under([True])
-    model.under([False])  # of hypotheses nobody asks for distances
+    regions = Regions.from_shapes(PLANE.space, [shape], ["round"])
+    model = replace(MODEL, regions=regions, samples=500, restarts=2)
+    under, dropped = model.under([True]).distribution(ACROSS), model.distribution(ACROSS).under([True])
+    assert len(dropped.weight) < 250
+    np.testing.assert_array_equal(under.paths, dropped.paths)
+    np.testing.assert_array_equal(under.weight, dropped.weight)
+    assert under.log_z == dropped.log_z
 
 
 def test_a_reward_falls_inside_and_near_a_truth_alone():
