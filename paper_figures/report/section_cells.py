@@ -60,16 +60,34 @@ def _target(rows: pd.DataFrame, most: int, least: int) -> str:
         near = equal[(equal["count"] / most).between(0.9, 1.1)]
         for kind in ("varying", "of each task"):
             varying = some[(some["kind"] == kind) & (some["count"] <= least)]
-            if not len(near) or not len(varying):
+            if not len(equal) or not len(varying):
                 continue
-            many, few = near.loc[near["error"].idxmin()], varying.loc[varying["error"].idxmin()]
+            few = varying.loc[varying["error"].idxmin()]
+            opening = f"- {title}: {few['count']:.0f} cells, {KINDS[kind]}, err by {_error(few)}, "
+            if not len(near):
+                lines.append(opening + _extrapolated(equal, most, few["error"]))
+                continue
+            many = near.loc[near["error"].idxmin()]
             verdict = "met" if few["error"] <= many["error"] else "missed"
             lines.append(
-                f"- {title}: {few['count']:.0f} cells, {KINDS[kind]}, err by {_error(few)}, "
-                f"{many['count']:.0f} cells, {KINDS[many['kind']]}, by {_error(many)}; the "
-                f"target, no larger an error, is {verdict}."
+                f"{opening}{many['count']:.0f} cells, {KINDS[many['kind']]}, by {_error(many)}; "
+                f"the target, no larger an error, is {verdict}."
             )
     return "\n".join(lines)
+
+
+def _extrapolated(equal: pd.DataFrame, most: int, aim: float) -> str:
+    """What so many equal cells would err by, where fewer were tried, if their order holds on."""
+    last = equal[equal["count"] == equal["count"].max()]
+    many = last.loc[last["error"].idxmin()]
+    order = slope(equal[equal["kind"] == many["kind"]])
+    error = many["error"] * (many["count"] / most) ** order
+    verdict = "met" if aim <= error else "missed"
+    return (
+        f"{many['count']:.0f} cells, {KINDS[many['kind']]}, by {_error(many)}. {most} of these were "
+        f"not tried; if their error goes on to fall with the order {order:.2f}, they err by "
+        f"{number(error)}, and the target, no larger an error, is {verdict}."
+    )
 
 
 def _table(rows: pd.DataFrame) -> str:

@@ -160,7 +160,10 @@ def test_of_a_truth_that_knows_no_distance_paths_that_keep_out_are_left():
     shape = Predicate(lambda states: states[..., 0] ** 2 + states[..., 1] ** 2 < 1)
     regions = Regions.from_shapes(PLANE.space, [shape], ["round"])
     model = replace(MODEL, regions=regions, samples=500, restarts=2)
-    under, dropped = model.under([True]).distribution(ACROSS), model.distribution(ACROSS).under([True])
+    under, dropped = (
+        model.under([True]).distribution(ACROSS),
+        model.distribution(ACROSS).under([True]),
+    )
     assert len(dropped.weight) < 250
     np.testing.assert_array_equal(under.paths, dropped.paths)
     np.testing.assert_array_equal(under.weight, dropped.weight)
