@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 
 from paper_figures.cell_errors import KINDS, PANELS, TABLES, error_rows, slope
@@ -81,11 +82,16 @@ def _extrapolated(equal: pd.DataFrame, most: int, aim: float) -> str:
     last = equal[equal["count"] == equal["count"].max()]
     many = last.loc[last["error"].idxmin()]
     order = slope(equal[equal["kind"] == many["kind"]])
+    told = (
+        f"{many['count']:.0f} cells, {KINDS[many['kind']]}, by {_error(many)}. {most} of these "
+        "were not tried"
+    )
+    if not np.isfinite(order):
+        return f"{told}."
     error = many["error"] * (many["count"] / most) ** order
     verdict = "met" if aim <= error else "missed"
     return (
-        f"{many['count']:.0f} cells, {KINDS[many['kind']]}, by {_error(many)}. {most} of these were "
-        f"not tried; if their error goes on to fall with the order {order:.2f}, they err by "
+        f"{told}; if their error goes on to fall with the order {order:.2f}, they err by "
         f"{number(error)}, and the target, no larger an error, is {verdict}."
     )
 
