@@ -98,7 +98,7 @@ def test_how_errors_fall_with_cells(tmp_path: Path) -> None:
     assert text.count("is missed") == 1
 
 
-def test_errors_in_four_dimensions_without_the_errors_of_samples(tmp_path: Path) -> None:
+def in_four_dimensions(most: int) -> pd.DataFrame:
     """Two tasks that err by 3 and 4 noises, of which one is taken off: sqrt((8 + 15) / 2)."""
     rows = [
         {"seed": 0, "kind": kind, "count": count, "task": task, "possible": True}
@@ -108,14 +108,17 @@ def test_errors_in_four_dimensions_without_the_errors_of_samples(tmp_path: Path)
             "trusted": True,
             "error_of_cells": float("nan"),
         }
-        for kind, counts in (("averaged", (10_000, 300_000)), ("of each task", (12_000,)))
+        for kind, counts in (("averaged", (10_000, most)), ("of each task", (12_000,)))
         for count in counts
         for task in (0, 1)
         for noise in (0.02 if count == 10_000 else 0.01,)
     ]
-    text = section_cells.telescope_section(
-        results(tmp_path, "cells_telescope", {"resolution": pd.DataFrame(rows)})
-    )
+    return pd.DataFrame(rows)
+
+
+def test_errors_in_four_dimensions_without_the_errors_of_samples(tmp_path: Path) -> None:
+    tables = {"resolution": in_four_dimensions(300_000)}
+    text = section_cells.telescope_section(results(tmp_path, "cells_telescope", tables))
     assert (
         "12000 cells, varying, for each task alone, err by 0.0339 [0.0283, 0.0387], 300000" in text
     )
@@ -123,6 +126,20 @@ def test_errors_in_four_dimensions_without_the_errors_of_samples(tmp_path: Path)
     assert "10000: 0.0678 [" in text
     assert "very many equal cells" not in text.split("Error against")[1]
     assert "equal, multilinear |" not in text
+
+
+def test_more_cells_than_were_tried_err_as_their_order_says(tmp_path: Path) -> None:
+    """Four times as many cells err by half, so that those of 30 times as many do by a fifth."""
+    table = in_four_dimensions(40_000)
+    tables = {"resolution": table}
+    text = section_cells.telescope_section(results(tmp_path, "cells_telescope", tables))
+    assert "40000 cells, equal, averaged, by 0.0339 [0.0283, 0.0387]. 300000 of these were" in text
+    # 0.0339 (40000 / 300000)^0.5
+    assert "with the order 0.50, they err by 0.0124, and the target, no larger an error, is" in text
+    assert text.count("is missed") == 1
+    few = {"resolution": table[table["count"] != 10_000]}
+    text = section_cells.telescope_section(results(tmp_path / "few", "cells_telescope", few))
+    assert "300000 of these were not tried." in text
 
 
 def test_transfer_of_points_that_are_of_no_case_is_missing(tmp_path: Path) -> None:
