@@ -72,9 +72,10 @@ def error_rows(resolution: pd.DataFrame) -> pd.DataFrame:
 def slope(rows: pd.DataFrame) -> float:
     """The order of convergence in the number of cells, where the cells can do every task.
 
-    The least squares fit of log error to log number; NaN of fewer than two.
+    The least squares fit of log error to log number; NaN of fewer than two that are above 0, as
+    none is whose paths err by more.
     """
-    able = rows[rows["possible"] == rows["tasks"]]
+    able = rows[(rows["possible"] == rows["tasks"]) & (rows["error"] > 0)]
     if len(able) < 2:
         return np.nan
     return float(-np.polyfit(np.log(able["count"]), np.log(able["error"]), 1)[0])

@@ -235,7 +235,7 @@ def full_disk(base: Path) -> None:
     expected = undisturbed(base)
     folder, sweep = folder_for(base, "full")
     (folder / "results").mkdir()
-    if os.system(f"mount -t tmpfs -o size=1m tmpfs {folder / 'results'} 2>/dev/null"):
+    if os.system(f"mount -t tmpfs -o size=500k tmpfs {folder / 'results'} 2>/dev/null"):
         print("full disk: not tried, as this user may not mount")
         return
     try:
