@@ -36,6 +36,8 @@ from mlci.sets.selection import select_regions
 from mlci.spaces import Bools, Floats, Ints
 
 _LEAST = 0.1  # nat a demonstration, as published
+_COLUMNS = ("demonstrations", "subset", "method", "expected")
+_COLUMNS += ("iou", "precision", "recall", "regions")
 _POINTS = 90_000  # at which hypotheses are compared with the truth
 
 
@@ -61,7 +63,8 @@ def area_tables(settings: Settings, point: PointInference) -> dict[str, pd.DataF
         for name in names
         for size in sorted(asked.demonstrations)
     }
-    for size in sorted(set(asked.demonstrations) & set(by_size)):
+    there = sorted(set(asked.demonstrations) & set(by_size))
+    for size in there:
         for number, subset in enumerate(by_size[size]):
             opening = {"demonstrations": size, "subset": number}
             scores, mask = by_cells.scores(subset)
@@ -75,12 +78,15 @@ def area_tables(settings: Settings, point: PointInference) -> dict[str, pd.DataF
             ]
             for name, share in shares.items():
                 columns[f"{name}_{size}"] += share / len(by_size[size])
-    if by_shapes is not None and by_size:
-        there = sorted(set(asked.demonstrations) & set(by_size))
+    if by_shapes is not None and there:
         for size, method, row in by_shapes.chosen(there):
             rows.append({"demonstrations": size, "subset": 0, "method": method, **row})
     of_cells = {"hypothesis": np.arange(len(cells)), "in_truth": by_cells.in_truth}
-    return {"areas": pd.DataFrame(rows), "area_map": pd.DataFrame({**of_cells, **columns})}
+    # Its columns are there also where too few demonstrations were kept for any row.
+    return {
+        "areas": pd.DataFrame(rows, columns=_COLUMNS),
+        "area_map": pd.DataFrame({**of_cells, **columns}),
+    }
 
 
 @dataclass(frozen=True, eq=False)

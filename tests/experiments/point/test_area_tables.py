@@ -51,6 +51,18 @@ def test_tables_of_areas(tmp_path: Path) -> None:
     assert cells["climb_9"].isna().all()  # three were kept
 
 
+@pytest.mark.parametrize("more", [[], ["inference.shapes.count=20"]])
+def test_fewer_demonstrations_than_asked_for_leave_a_table_without_rows(
+    more: list[str], tmp_path: Path
+) -> None:
+    words = ["areas.subsets=1", "areas.demonstrations=[9]", "inference.shapes.samples=50"]
+    settings = read_config(composed(*TINY, *words, *more))[0]
+    tables = run_point(settings, Store(tmp_path), lambda line: None)
+    assert not len(tables["areas"])
+    assert {"demonstrations", "method", "iou"} <= set(tables["areas"].columns)
+    assert tables["area_map"]["climb_9"].isna().all()
+
+
 def test_each_subset_has_the_answer_of_its_own_demonstrations(tmp_path: Path) -> None:
     """Each demonstration speaks for a slice of its own, the second for the wall."""
     words = ["areas.subsets=3", "areas.demonstrations=[1]", "areas.log_odds=3"]
