@@ -69,12 +69,30 @@ def _target(rows: pd.DataFrame, most: int, least: int) -> str:
                 lines.append(opening + _extrapolated(equal, most, few["error"]))
                 continue
             many = near.loc[near["error"].idxmin()]
-            verdict = "met" if few["error"] <= many["error"] else "missed"
+            of_kind = some[some["kind"] == kind]
+            verdict = (
+                "met"
+                if few["error"] <= many["error"]
+                else f"missed: {_enough(of_kind, many['error'])}"
+            )
             lines.append(
                 f"{opening}{many['count']:.0f} cells, {KINDS[many['kind']]}, by {_error(many)}; "
                 f"the target, no larger an error, is {verdict}."
             )
+    if any("missed" in line for line in lines):
+        lines.append(
+            "\nVarying cells begin as equal ones, so that their higher order gains little with few."
+        )
     return "\n".join(lines)
+
+
+def _enough(rows: pd.DataFrame, aim: float) -> str:
+    """How many cells of a kind err by no more than some error, between the numbers tried."""
+    able = rows[rows["error"] > 0].sort_values("error")
+    if not len(able) or aim < able["error"].min():
+        return "more are needed than were tried"
+    count = np.exp(np.interp(np.log(aim), np.log(able["error"]), np.log(able["count"])))
+    return f"about {count:.0f} are needed"
 
 
 def _extrapolated(equal: pd.DataFrame, most: int, aim: float) -> str:

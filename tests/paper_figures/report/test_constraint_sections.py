@@ -96,6 +96,9 @@ def test_how_errors_fall_with_cells(tmp_path: Path) -> None:
     worse.loc[worse["kind"] == "varying", "error"] *= 1.1
     text = section_cells.section(results(tmp_path / "w", "cells", {"resolution": worse}))
     assert text.count("is missed") == 1
+    # Varying cells err by 1 / count, and by a tenth more as much as a tenth fewer: 440.
+    assert "is missed: about 440 are needed.\n" in text
+    assert text.count("Varying cells begin as equal ones") == 1
 
 
 def in_four_dimensions(most: int) -> pd.DataFrame:
