@@ -36,8 +36,10 @@ from mlci.sets.selection import select_regions
 from mlci.spaces import Bools, Floats, Ints
 
 _LEAST = 0.1  # nat a demonstration, as published
-_COLUMNS = ("demonstrations", "subset", "method", "expected")
-_COLUMNS += ("iou", "precision", "recall", "regions")
+_COLUMNS = (
+    *("demonstrations", "subset", "method", "expected"),
+    *("iou", "precision", "recall", "regions"),
+)
 _POINTS = 90_000  # at which hypotheses are compared with the truth
 
 
