@@ -69,16 +69,15 @@ class Softened(Wrapped):
 
 @dataclass(frozen=True, eq=False)
 class Detours:
-    """Ways round a truth, and what proposes paths that keep out of it.
+    """A truth, and what proposes paths that keep out of it.
 
     Attributes:
         truth: its regions.
-        modes: the ways, then those that do not know of the truth.
-        policies: round each, so that paths near to the truth and far from it are all proposed.
+        policies: round each way of `find_detours`, so that paths near to the truth and far from it
+            are all proposed.
     """
 
     truth: Regions
-    modes: Modes
     policies: LocalPolicies
 
     def depth(self, paths: Floats) -> Floats:

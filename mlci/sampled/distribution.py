@@ -268,6 +268,6 @@ def under_truth(
     rng = np.random.default_rng([*key, SEARCH])
     soft = softened(free.passage, regions, free.paths, free.weight)
     modes, policies = find_detours(free.passage, free.modes, free.proposal, soft, restarts, rng)
-    detours = Detours(regions, modes, policies)
+    detours = Detours(regions, policies)
     anew = sample_passage(free.passage, free.regions, modes, samples, key, detours)
     return replace(anew, truth=truth)
