@@ -8,7 +8,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # The studies of the paper's claims, the longest first, and all others; the experiment `smoke` repeats
 # the paper's.
-STUDIES := telescope paper sensitivity calibration in_cell
+STUDIES := telescope paper calibration sensitivity in_cell
 OTHERS := $(filter-out $(STUDIES) smoke,$(basename $(notdir $(wildcard conf/experiment/*.yaml))))
 
 # Two studies run at a time, each on half of the cores: while one plans its points, waits for what they
@@ -19,8 +19,9 @@ HALF := $(shell echo $$(( ($$(getconf _NPROCESSORS_ONLN) + 1) / 2 )))
 STRESS := $(addprefix tests/stress/,hydra14.sh storm.py plans.py long_tests.sh fuzz.py)
 STRESS += $(filter-out $(STRESS),$(wildcard tests/stress/*.py tests/stress/*.sh))
 
-# Each line of a study with its name, as another one runs beside it.
-SAY = (trap "" INT; awk "{ print \"$*: \" \$$0; fflush() }")
+# Each line of a study with its name, as another one runs beside it, and as soon as it is there: some
+# versions of awk wait for thousands of characters.
+SAY = (trap "" INT; while IFS= read -r line || [ -n "$$line" ]; do echo "$*: $$line"; done)
 
 .PHONY: help install paper studies field figures report smoke test stress lint benchmark lock
 
@@ -32,7 +33,8 @@ install: .venv/installed ## install what running needs, without tools; EXTRAS="p
 
 paper: $(READY) ## run what is missing of the paper's studies, draw their figures, write the report
 	@$(MAKE) --no-print-directory --keep-going --jobs=2 $(STUDIES:%=study-%)
-	@$(MAKE) --no-print-directory figures
+	$(BIN)/python -m paper_figures $(STUDIES)
+	@$(MAKE) --no-print-directory report
 
 study-%: $(READY)
 	@bash -o pipefail -c '$(BIN)/python experiments/run.py -m experiment=$* workers=$(HALF) sweep.replace=true 2>&1 | $(SAY)'

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.tracking.files import digest, read_file
+from experiments.tracking.files import digest, file_digest
 from experiments.tracking.forms import sound_study
 from experiments.tracking.names import inner_path, is_digest, is_name
 from experiments.tracking.sealed import SealError, read_sealed, write_sealed
@@ -58,7 +58,7 @@ def figure_note(path: Path, module: str, tables: Mapping[str, bytes]) -> dict[st
         "module": module,
         "drawn_by": _drawing_source(module),
         "tables": {name: digest(data) for name, data in tables.items()},
-        "files": {file.name: digest(read_file(file)) for file in files},
+        "files": {file.name: file_digest(file) for file in files},
     }
 
 
@@ -116,7 +116,7 @@ def write_note(folder: Path, figures: Mapping[str, Mapping[str, Any]], made_of: 
 def made_of(folder: Path) -> str:
     """Hash of all that decides which figures a study has: its tables, and the code that draws."""
     tables = sorted((folder / "tables").glob("*.csv"))
-    contents = {path.name: digest(read_file(path)) for path in tables}
+    contents = {path.name: file_digest(path) for path in tables}
     return digest(canonical_json([contents, _drawing_source(_DRAWS)]))
 
 
@@ -156,7 +156,7 @@ def file_change(path: Path, before: str, verb: str | None) -> str | None:
         verb: how it was made, "written"; None if it may be made anew.
     """
     try:
-        if digest(read_file(path)) == before:
+        if file_digest(path) == before:
             return None
     except FileNotFoundError:
         return f"{path.name} is missing"

@@ -14,6 +14,7 @@ import json
 import os
 import secrets
 import stat
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -25,11 +26,45 @@ if TYPE_CHECKING:
 PART = ".part"  # the end of the names of files that are being written
 
 _EXCHANGE, _HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux
+_STEP = 2_000_000_000  # [ns] the coarsest that a file system's clock has: that of FAT
+
+_digests: dict[str, tuple[list[int], str]] = {}  # stamps and digests of files, in this process
 
 
 def digest(data: bytes) -> str:
     """sha256 in hexadecimal."""
     return hashlib.sha256(data).hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """sha256 of a regular file, which is read again only where it may have changed.
+
+    Raises:
+        OSError: as of `read_file`.
+    """
+    stamp = file_stamp(path, follow_symlinks=False)
+    before, value = _digests.get(str(path), (None, ""))
+    if before != stamp:
+        value = digest(read_file(path))
+        if is_settled(stamp):
+            _digests[str(path)] = stamp, value
+    return value
+
+
+def file_stamp(path: Path | str, *, follow_symlinks: bool = True) -> list[int]:
+    """What changes with a file, as git knows files: size, times of last change, and inode.
+
+    No change of a file leaves all of them as they are, but one within a step of its file system's
+    clock: see `is_settled`.
+    """
+    status = os.stat(path, follow_symlinks=follow_symlinks)
+    return [status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino]
+
+
+def is_settled(stamp: list[int]) -> bool:
+    """Whether a change of the file from now on gives it another stamp."""
+    _, modified, changed, _ = stamp
+    return time.time_ns() - max(modified, changed) > _STEP
 
 
 def read_file(path: Path) -> bytes:

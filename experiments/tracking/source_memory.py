@@ -12,9 +12,7 @@ write, or is not to (PYTHONDONTWRITEBYTECODE), there is none, and files are read
 from __future__ import annotations
 
 import json
-import os
 import sys
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cached_property
@@ -22,9 +20,13 @@ from importlib.util import cache_from_source
 from pathlib import Path
 from typing import Any
 
-from experiments.tracking.files import digest, read_file, replace_file
-
-_STEP = 2_000_000_000  # [ns] the coarsest that a file system's clock has: that of FAT
+from experiments.tracking.files import (
+    digest,
+    file_stamp,
+    is_settled,
+    read_file,
+    replace_file,
+)
 
 
 class SourceMemory:
@@ -40,14 +42,14 @@ class SourceMemory:
         Once that changes, all is forgotten, as it may read otherwise.
         """
         self.path = Path(cache_from_source(reader)).with_suffix(".json")
-        self._reader = _stamp(reader)
-        self._is_sure = _is_settled(self._reader)
+        self._reader = file_stamp(reader)
+        self._is_sure = is_settled(self._reader)
         self._is_new = False
 
     def recall(self, path: str, read: Callable[[str], Any]) -> Any:
         """What `read` says of a file; it is asked only if the file is new or has changed."""
-        stamp = _stamp(path)
-        lasts = self._is_sure and _is_settled(stamp)
+        stamp = file_stamp(path)
+        lasts = self._is_sure and is_settled(stamp)
         before, value = self._known.get(path, (None, None))
         if before != stamp:
             value = read(path)
@@ -76,15 +78,3 @@ class SourceMemory:
         except (OSError, ValueError):
             pass
         return {}
-
-
-def _stamp(path: str) -> list[int]:
-    """What changes with a file: its size, times of last change, and inode."""
-    status = os.stat(path)
-    return [status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino]
-
-
-def _is_settled(stamp: list[int]) -> bool:
-    """Whether a change of the file from now on gives it another stamp."""
-    _, modified, changed, _ = stamp
-    return time.time_ns() - max(modified, changed) > _STEP

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.tracking.files import digest, read_file
+from experiments.tracking.files import digest, file_digest, read_file
 from experiments.tracking.names import inner_path
 from experiments.tracking.study import Study, StudyError, read_study
 
@@ -60,7 +60,7 @@ def table_changes(study: Study) -> TableChanges:
     missing, damaged = [], []
     for name, before in (study.collated.tables if study.collated else {}).items():
         try:
-            if digest(read_file(inner_path(study.folder, "tables", name))) != before:
+            if file_digest(inner_path(study.folder, "tables", name)) != before:
                 damaged.append(f"table {name} was changed after it was written")
         except FileNotFoundError:
             missing.append(name)

@@ -2,6 +2,7 @@
 
 import os
 import re
+import time
 from pathlib import Path
 
 import pandas as pd
@@ -82,6 +83,39 @@ def test_only_regular_files_are_read(tmp_path: Path) -> None:
     for name, reason in (("link", "is a link"), ("pipe", "no regular file"), (".", "regular")):
         with pytest.raises(OSError, match=reason):
             read_file(tmp_path / name)
+
+
+def test_a_digest_is_that_of_the_file_of_now(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also of one that another file of its size and time has taken the place of, or a link."""
+    path, new, later = tmp_path / "table.csv", tmp_path / "new", time.time_ns() + 3600 * 10**9
+    monkeypatch.setattr(time, "time_ns", lambda: later)
+    for content in (b"a\n1\n", b"a\n2\n"):
+        new.write_bytes(content)
+        os.utime(new, (1e9, 1e9))
+        os.replace(new, path)
+        assert [files.file_digest(path) for _ in range(2)] == [files.digest(content)] * 2
+    path.rename(new)
+    path.symlink_to(new)
+    with pytest.raises(OSError, match="link"):
+        files.file_digest(path)
+
+
+def test_a_file_that_did_not_change_is_read_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And one that may change within a step of its file system's clock each time."""
+    path, reads = tmp_path / "table.csv", []
+    path.write_bytes(b"a\n1\n")
+    changed = max(path.stat().st_mtime_ns, path.stat().st_ctime_ns)
+    monkeypatch.setattr(files, "read_file", lambda each: reads.append(each) or b"")
+    for age, count in ((files._STEP, 2), (files._STEP + 1, 1)):
+        monkeypatch.setattr(time, "time_ns", lambda age=age: changed + age)
+        reads.clear()
+        for _ in range(2):
+            files.file_digest(path)
+        assert len(reads) == count
 
 
 @pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])

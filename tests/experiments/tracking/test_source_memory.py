@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from experiments.tracking import source_memory, sources
+from experiments.tracking.files import _STEP
 from experiments.tracking.source_memory import SourceMemory
 
 HOUR = 3_600_000_000_000  # [ns]
@@ -89,8 +90,8 @@ def test_a_file_as_young_as_the_step_of_a_clock_is_not_remembered(
     """On a file system whose clock stands still between two edits."""
     reader, path = files
     stamps = {str(reader): [6, 0, 0, 1], str(path): [6, HOUR, HOUR, 2]}
-    monkeypatch.setattr(source_memory, "_stamp", lambda name: stamps[name])
-    for age, content in ((source_memory._STEP, "A = 2\n"), (source_memory._STEP + 1, "A = 1\n")):
+    monkeypatch.setattr(source_memory, "file_stamp", lambda name: stamps[name])
+    for age, content in ((_STEP, "A = 2\n"), (_STEP + 1, "A = 1\n")):
         path.write_text("A = 1\n")
         monkeypatch.setattr(time, "time_ns", lambda age=age: HOUR + age)
         Process(reader).read(path)
