@@ -30,7 +30,7 @@ METHODS = {
     "climb": "posterior of the set",
     "likeliest": "most probable shapes",
     "shapes": "best area of shapes",
-    "chosen": "the same, chosen tasks",
+    "chosen": "best area, chosen tasks",
     "ideal": "random tasks, all assumptions right",
     "ideal_chosen": "chosen tasks, all assumptions right",
     "shown": "all of the truth that was shown",

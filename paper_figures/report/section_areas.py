@@ -24,10 +24,10 @@ def section(results: Results) -> str:
     )
     reached = curve[(curve["iou"] >= AIM) & ~curve["method"].isin(CEILINGS)]
     first = (
-        f"no method reaches {AIM:g} with as many as were tried"
+        "by no method with as many as were tried"
         if reached.empty
-        else "; ".join(
-            f"{METHODS[str(method)]} reaches {AIM:g} with {rows['demonstrations'].min()}"
+        else ", ".join(
+            f"with {rows['demonstrations'].min()} (*{METHODS[str(method)]}*)"
             for method, rows in reached.groupby("method", sort=False)
         )
     )
@@ -52,8 +52,8 @@ def section(results: Results) -> str:
         "while the posterior of the set rises, under a prior by which a set is as probable as the "
         f"length of its border says.\n\n"
         f"{_shapes(curve)}"
-        f"Of the mean overlap, {first}. Demonstrations that pass one ellipse alone tell nothing of "
-        "the other.\n\n"
+        f"The mean overlap reaches {AIM:g} {first}. Demonstrations that pass one ellipse alone "
+        "tell nothing of the other.\n\n"
         + table(
             ["demonstrations", "method", "overlap", "precision", "recall", "squares or parts"],
             lines,
