@@ -150,14 +150,21 @@ def summary(rows: pd.DataFrame) -> str:
     """The share of pairs of a task and a region within 95 % intervals, as a sentence a line.
 
     Intervals by the samples alone; with the difference of both cells as the error of the finer
-    ones; and with a third of it, as where errors fall with the square of a cell's side.
+    ones; with a third of it, as where errors fall with the square of a side that is halved; and
+    with the root mean square of the differences of a task, as one region's may be small by chance.
     """
     told = rows[rows["trusted"] & rows["fine"].between(*BETWEEN)]
     gap, apart = (told["phi"] - told["fine"]).abs(), (told["fine"] - told["coarse"]).abs()
     tasks = f"{told['task'].nunique()} tasks trusted of {rows['task'].nunique()}"
     lines = [f"{len(told)} pairs of {tasks}; mean |Phi - cells| {gap.mean():.4f}"]
-    for words, of_cells in (("no error", 0.0), ("the difference", 1.0), ("a third", 1 / 3)):
-        within = gap < LEVEL * np.hypot(told["error"], of_cells * apart)
+    typical = np.sqrt(np.square(apart).groupby(told["task"]).transform("mean"))
+    for words, of_cells in {
+        "no error": 0.0,
+        "the difference": apart,
+        "a third": apart / 3,
+        "the task's difference": typical,
+    }.items():
+        within = gap < LEVEL * np.hypot(told["error"], of_cells)
         by_task = within.groupby(told["task"]).mean()
         error = by_task.std() / np.sqrt(len(by_task))
         lines.append(f"{words} of cells: {within.mean():.3f} within (+- {error:.3f} by tasks)")
