@@ -18,6 +18,7 @@ from mlci.inference import Inference
 from mlci.next_task import NextTask, entropy, nearly_the_same, next_tasks, plausible, simulate_tasks
 from mlci.regions import Regions
 from mlci.spaces import Bools, Box, Floats, StateSpace
+from mlci.systems import FunctionSystem
 from mlci.tabular import TabularModel
 
 STEPS, REGIONS = 5, 4
@@ -150,6 +151,7 @@ def test_what_one_task_reveals_is_not_expected_of_the_next() -> None:
     first, second = next_tasks(model, nothing_seen(model), tasks, exact_ends=False)
     assert first.information == pytest.approx(np.log(2))
     assert second.information == pytest.approx(0, abs=1e-12)
+    assert first.chance == second.chance == pytest.approx(1)  # of each alone
 
 
 def test_each_task_has_trajectories_of_its_own_by_the_seed() -> None:
@@ -232,6 +234,9 @@ def test_tasks_are_nearly_the_same_the_short_way_round() -> None:
     assert nearly_the_same(space, one, task([9.9, 0.1], [5.5, 0.1]))
     assert not nearly_the_same(space, one, task([8.9, 0.1], [5.5, 0.1]))
     assert not nearly_the_same(space, one, task([0.1, 0.0], [5.0, 0.3]))
+    narrow, wide = (Task(one.start, Box(one.goal.lower, [upper, 0.0]), 1.0) for upper in (5.5, 7.0))
+    assert nearly_the_same(space, one, narrow)
+    assert not nearly_the_same(space, one, wide)
     free = Task(np.array([0.1, 0.0]), Box([5.0, -np.inf], [5.0, np.inf]), 1.0)
     assert nearly_the_same(space, free, free)
     assert not nearly_the_same(space, one, free)
@@ -247,6 +252,18 @@ def test_nobody_is_asked_to_begin_or_end_in_what_may_be_forbidden() -> None:
     for model, information in ((away(crossing), np.log(2)), (crossing, 0.0)):
         chosen = next_tasks(model, nothing_seen(model), [task], exact_ends=False)
         assert chosen[0].information == pytest.approx(information)
+
+
+def test_what_only_a_cell_decides_is_not_expected_to_tell() -> None:
+    """A pillar holds the centre of the first cell, but not the start: trajectories differ."""
+    floor = StateSpace(Box([0.0, 0.0], [4.0, 3.0]), [False, False], ("x", "y"))
+    walker = FunctionSystem(lambda x, u: (u[..., 0], u[..., 1]), floor, Box([-1, -1], [1, 1]))
+    pillar = Regions.from_boxes(floor, [Box([0.4, 1.4], [1.3, 1.6])])
+    cells, actions = mlci.Grid(floor, (4, 3)), mlci.action_grid(walker, 3)
+    model = mlci.discretize(walker, cells, actions, 1.0, pillar)
+    task = Task(np.array([0.9, 1.1]), Box.point([3.5, 1.5]), 3.0)
+    assert 0.1 < mlci.prepare(model, [task]).avoidance[0, 0] < 0.9
+    assert next_tasks(model, nothing_seen(model), [task])[0].information == 0
 
 
 def test_a_task_as_a_record_for_programs() -> None:

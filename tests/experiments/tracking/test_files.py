@@ -118,6 +118,18 @@ def test_a_file_that_did_not_change_is_read_once(
         assert len(reads) == count
 
 
+def test_a_file_is_settled_two_seconds_after_the_later_of_its_times(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The time of the content may be set back, and then that of the inode is young."""
+    now = 10**18
+    monkeypatch.setattr(time, "time_ns", lambda: now)
+    old, young = now - 2 * 10**9 - 1, now - 2 * 10**9
+    assert files.is_settled([4, old, old, 1])
+    assert not files.is_settled([4, old, young, 1])
+    assert not files.is_settled([4, young, old, 1])
+
+
 @pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])
 def test_the_umask_says_who_may_read(mask: int, tmp_path: Path) -> None:
     before = os.umask(mask)

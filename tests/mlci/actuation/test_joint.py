@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mlci.actuation.inference import infer_controls
-from mlci.actuation.joint import KINDS, JointInference, infer_joint
+from mlci.actuation.joint import KINDS, NOTHING, JointInference, infer_joint
 from mlci.actuation.limited import Limited
 from mlci.actuation.moves import ControlledMoves
 from mlci.actuation.ranges import ControlRanges
@@ -91,6 +91,7 @@ def test_the_posterior_of_pairs_is_that_of_the_separate_beliefs_and_of_both() ->
     assert joint.violated[0, :, -1].tolist() == [False, True, False, False]
     assert joint.violated[:, -1, 0].tolist() == [False, False]
     assert joint.violated[:, -1, 1].all()
+    assert joint.violated[0, 1].all()  # also the pair of which both are
     np.testing.assert_allclose(joint.gain[:-1, -1], apart[0].evidence.sum(axis=0))
     np.testing.assert_allclose(joint.gain[-1, :-1], apart[1].evidence.sum(axis=0))
     prior = np.full((4, 3), 0.1 / 6)
@@ -110,14 +111,38 @@ def test_the_posterior_of_pairs_is_that_of_the_separate_beliefs_and_of_both() ->
     assert frame["posterior"].is_monotonic_decreasing
     first = joint.of_some([0])
     np.testing.assert_allclose(first.gain, joint.evidence[0])
+    np.testing.assert_array_equal(joint.of_some([1, 0]).of_kinds, joint.of_kinds)
+
+
+def test_options_count_for_pairs_as_for_the_inferences_of_one() -> None:
+    """Ends at cells, a rounded horizon, some regions, and rates that are not theirs."""
+    controls = np.repeat([[0.5, 0.5], [0.5, 0.0], [0.0, -0.5]], 7, axis=0)
+    states = rollout(WALKER, [0.9, 0.15], controls, 0.2)
+    task = Task(states[0], TASK.goal, 4.2)
+    walks = [Demonstration(task, states, controls, np.arange(22) * 0.2, "between")]
+    some = np.array([True, True, False])
+    for exact_ends in (True, False):
+        options = {"exact_ends": exact_ends, "round_horizon": True}
+        regions = infer(MODEL, walks, hypotheses=some, **options)
+        limits = infer_controls(MODEL, walks, RANGES, **options)
+        rates = Rates(0.2, 0.1)
+        joint = infer_joint(MODEL, walks, regions, limits, hypotheses=some, rates=rates, **options)
+        np.testing.assert_allclose(joint.avoidance[:, :-1, -1], regions.avoidance)
+        np.testing.assert_allclose(joint.avoidance[:, -1, :-1], limits.avoidance)
+        assert joint.regions == (*regions.hypotheses.names, NOTHING)
+        alpha, entered = joint.avoidance[0, 1, -1], joint.violated[0, 1, -1]
+        assert 0.1 < alpha < 0.9
+        expected = 0.1 if entered else 0.9 / (0.8 * alpha + 0.2) + 0.1
+        assert joint.gain[1, -1] == pytest.approx(np.log(expected))
 
 
 def test_what_a_cell_decides_adds_nothing_to_controls() -> None:
     walks = [demonstration([1, 2, 2, 3], "round")]
     regions, controls = infer(MODEL, walks), infer_controls(MODEL, walks, RANGES)
-    decided = replace(regions, decided_by_cell=np.array([[True, False, False]]))
+    decided = replace(regions, decided_by_cell=np.array([[True, True, False]]))
     joint = infer_joint(MODEL, walks, decided, controls)
     np.testing.assert_array_equal(joint.avoidance[:, 0], joint.avoidance[:, -1])
+    assert joint.violated[0, :, -1].tolist() == [False, True, False, False]  # who enters, enters
 
 
 def test_refusals() -> None:

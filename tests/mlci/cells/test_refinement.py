@@ -78,6 +78,65 @@ def test_cells_that_cannot_do_a_task_are_refined_too() -> None:
     assert refine(coarse, TASKS, 30).states == 30
 
 
+def test_cells_grow_by_a_share_in_each_round_and_it_is_told() -> None:
+    told: list[tuple[int, int]] = []
+    refine(model(), TASKS, 150, growth=0.1, progress=lambda *counts: told.append(counts))
+    expected = [told[0][0]]
+    while expected[-1] < 150:
+        expected.append(min(150, expected[-1] + expected[-1] // 10))
+    assert told == [(size, 150) for size in expected]
+
+
+def test_the_cells_that_matter_most_are_halved_where_they_do() -> None:
+    """Two rounds by hand, for tasks whose goals are whole cells."""
+    corners = PENDULUM.space.bounds.lower + GRID.widths * [[4, 4], [3, 6]]
+    tasks = [
+        mlci.Task(task.start, mlci.Box(corner, corner + GRID.widths), 3.0)
+        for task, corner in zip(TASKS, corners, strict=True)
+    ]
+    tree = goal_tree(GRID, [task.goal for task in tasks], GRID.widths)
+    for more in (10, 11):  # a tenth of 100, and of 110
+        ways = [TrajectoryDistribution.of_task(model(tree), it, exact_ends=True) for it in tasks]
+        matters = sum(importance(way, tree) for way in ways)
+        most, along = np.argsort(np.max(matters, axis=1))[-more:], np.full(tree.size, -1)
+        along[most] = matters[most, 1] > matters[most, 0]
+        tree = tree.halved(along)
+    assert np.array_equal(refine(model(), tasks, 121, growth=0.1).grid.centers, tree.centers)
+
+
+def test_what_no_task_comes_by_stays_as_it_is() -> None:
+    corner = PENDULUM.space.bounds.lower + GRID.widths * (1, 5)
+    one_step = mlci.Task(TASKS[0].start, mlci.Box(corner, corner + GRID.widths), 0.25)
+    assert refine(model(), [one_step], 250).states == 100
+
+
+def test_the_cell_of_a_goal_is_as_wide_as_equal_cells_of_that_number() -> None:
+    tree = refine(model(), TASKS[:1], 400, growth=1.0).grid
+    assert tree.sides[tree.index(TASKS[0].goal.lower)] == pytest.approx(GRID.widths / 2)
+
+
+def test_the_cells_of_a_goal_that_is_no_point_are_refined_like_others() -> None:
+    along = mlci.Box([2.7, -0.4], [2.7, 1.4])
+    first = goal_tree(GRID, [along], GRID.widths / 2)
+    refined = refine(model(), [mlci.Task(TASKS[0].start, along, 3.0)], 400, growth=1.0).grid
+    before, after = (each.sides[each.index(along.lower)].prod() for each in (first, refined))
+    assert after < 0.6 * before
+
+
+def test_options_of_tasks_count_for_their_cells() -> None:
+    """A rounded horizon is the round one, and where in its cell one starts is of no account."""
+
+    def cells(shift: float, horizon: float, exact_ends: bool) -> list[list[float]]:
+        task = mlci.Task(TASKS[0].start + shift, TASKS[0].goal, horizon)
+        options = {"round_horizon": True, "exact_ends": exact_ends}
+        return refine(model(), [task], 130, **options).grid.centers.tolist()
+
+    for exact_ends in (True, False):
+        assert cells(0.0, 3.05, exact_ends) == cells(0.0, 3.0, exact_ends)
+    assert cells(0.05, 3.0, False) == cells(0.0, 3.0, False)
+    assert cells(0.05, 3.0, True) != cells(0.0, 3.0, True)
+
+
 def test_visits_and_levels_are_those_of_the_distribution() -> None:
     one = model(samples=1)
     start, goal = one.grid.index([[1.0, 0.5], [2.1, 1.3]])

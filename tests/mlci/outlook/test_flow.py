@@ -36,6 +36,14 @@ def test_the_reach_of_a_linear_system_is_an_integral() -> None:
     np.testing.assert_allclose(reach, 12.0 * np.abs(expected) / grid.widths, rtol=1e-3)
 
 
+def test_the_reach_is_the_mean_over_cells_where_controls_push_unequally() -> None:
+    """x' = (1 + x) u: cells of [0, 4] are pushed by 3 on average, and by 4.5 at most."""
+    space = StateSpace(Box([0.0], [4.0]), [False], ("x",))
+    system = FunctionSystem(lambda x, u: ((1.0 + x[..., 0]) * u[..., 0],), space, Box([-1], [1]))
+    reach = control_reach(system, Grid(space, (4,)), Box([-1.0], [1.0]), 0.1)
+    np.testing.assert_allclose(reach, [2 * 3 * 0.1], rtol=1e-6)
+
+
 def path_of(system, start, seconds: float, steps: int) -> Demonstration:
     controls = np.zeros((steps, 1))
     states = rollout(system, start, controls, seconds / steps)

@@ -8,15 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mlci.demonstrations import Demonstration, Task, even_times
 from mlci.demonstrator import demonstrate, sample_trials
 from mlci.diagnosis import Diagnosis, diagnose
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.outlook.detours import tabular_detours
+from mlci.outlook.flow import control_reach, flow_expansion
 from mlci.outlook.outlook import FEATURES, Outlook, outlook
 from mlci.regions import Regions
-from mlci.spaces import Box
-from mlci.systems import DoubleIntegrator
+from mlci.spaces import Box, StateSpace
+from mlci.systems import DoubleIntegrator, FunctionSystem
 from mlci.tabular import action_grid, discretize
 
 SYSTEM = DoubleIntegrator()
@@ -67,6 +69,12 @@ def test_each_number_is_that_of_a_loop(model, paths) -> None:
     diagnosis = diagnose(model)
     assert set(features["frozen"]) == {max(diagnosis.frozen)}
     np.testing.assert_allclose(np.exp(features["cells_crossed"]), diagnosis.cells_crossed)
+    reach = control_reach(SYSTEM, model.grid, SYSTEM.control_box, 0.5)
+    np.testing.assert_allclose(features["reach"], np.log(reach.min() + 0.01))
+    stretched = np.mean([flow_expansion(SYSTEM, path) for path in paths])
+    np.testing.assert_allclose(features["expansion"], stretched)
+    held = [[REGIONS.box(i).contains(p.states[[0, -1]]).any() for i in range(18)] for p in paths]
+    np.testing.assert_array_equal(known.ends, held)
     assert set(features["unreachable"]) == {np.mean(~known.reachable)}
     off = np.abs(phi - entered).sum(axis=1)[known.reachable].mean()
     np.testing.assert_allclose(features["forecast_error"], off / entered.sum(axis=1).mean())
@@ -133,6 +141,22 @@ def test_a_mask_takes_the_hypotheses_alone(model, paths) -> None:
     np.testing.assert_array_equal(some.crossed, all_of_them.crossed[mask])
 
 
+def test_what_only_a_cell_decides_counts_for_nothing() -> None:
+    """The pillar holds the centre of the first cell, but not the start."""
+    floor = StateSpace(Box([0.0, 0.0], [4.0, 3.0]), [False, False], ("x", "y"))
+    walker = FunctionSystem(lambda x, u: (u[..., 0], u[..., 1]), floor, Box([-1, -1], [1, 1]))
+    pillars = Regions.from_boxes(floor, [Box([0.4, 1.4], [1.3, 1.6]), Box([1.4, 0.0], [1.6, 3.0])])
+    model = discretize(walker, Grid(floor, (4, 3)), action_grid(walker, 3), 1.0, pillars)
+    states = np.linspace([0.9, 1.1], [3.5, 1.5], 31)
+    task = Task(states[0], Box.point(states[-1]), 3.0)
+    controls = np.diff(states, axis=0) / 0.1
+    path = Demonstration(task, states, controls, even_times(31, 0.1))
+    between_states = TrajectoryDistribution.of_task(model, task, exact_ends=True)
+    assert 0.1 < between_states.violation_probabilities()[0] < 0.9
+    assert TrajectoryDistribution.of_task(model, task).violation_probabilities()[0] > 0.999
+    np.testing.assert_allclose(outlook(model, [path]).phi, [[0.0, 1.0]])
+
+
 def test_no_path_is_refused(model) -> None:
     with pytest.raises(ValueError, match="an outlook needs the optimal path of a task at least"):
         outlook(model, [])
@@ -152,5 +176,7 @@ def test_a_detour_keeps_out_of_a_region_that_the_best_way_enters(model, paths) -
         for region in np.flatnonzero(model.crossed(cells[:, :-1], moves)[0]).tolist():
             (crossed,) = detours(region, np.array([number]))
             assert not crossed[region]
+            later = tabular_detours(model, tasks, np.arange(18) >= region)  # its first is the same
+            np.testing.assert_array_equal(later(0, np.array([number])), [crossed[region:]])
             kept_out += int(crossed.any())
     assert kept_out  # of some regions there is a way round

@@ -60,6 +60,7 @@ def test_what_is_left_out_has_no_part_in_its_own_forecast(foretell) -> None:
 def test_the_feature_that_tells_is_chosen_and_none_where_none_does() -> None:
     features, success, groups = cases()
     assert choose_features(features, success, groups, most=1) == [1]
+    assert choose_features(features, success, groups, most=4) == [1]  # others add nothing to it
     assert choose_features(features, success, groups, most=2, first=[3]) == [3, 1]
     assert choose_features(features, success, np.zeros(120), most=2, first=[3]) == [3]
     rng = np.random.default_rng(1)

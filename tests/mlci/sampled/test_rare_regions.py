@@ -3,13 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_bridge import WIDE, Bridge, random_bridge
+from scipy.special import ndtri
 
 from mlci.demonstrations import Task
 from mlci.regions import Regions
 from mlci.sampled.distribution import SampledDistribution
 from mlci.sampled.model import SampledModel
 from mlci.sampled.passage import Passage
-from mlci.sampled.rare_regions import rare_violations
+from mlci.sampled.rare_regions import RareViolations, rare_violations
 from mlci.shapes.predicates import Predicate
 from mlci.spaces import Box, Floats
 from mlci.systems import Pendulum
@@ -87,9 +88,12 @@ def test_a_box_beside_the_way_and_what_is_not_rare():
     regions = Regions(WIDE.space, [middle, start - 0.2], [middle + 0.5, start + 0.2])
     paths = bridge.paths(20_000, np.random.default_rng(2))
     share = np.mean(regions.violated_by(paths), axis=0)
-    rare = rare_violations(sampled(bridge, regions), [0, 1])
+    distribution = sampled(bridge, regions)
+    rare = rare_violations(distribution, [0, 1])
+    assert rare.error[1] > distribution.log_z_error  # what all paths cross is as uncertain as Z
     error = np.hypot(rare.error, np.sqrt(share * (1 - share) / len(paths)))
     assert share[1] == 1
+    assert rare.upper[1] == 1
     assert 0 < share[0] < 0.02
     assert np.all(np.abs(rare.phi - share) < 3.2 * error)
 
@@ -111,6 +115,36 @@ def test_where_no_path_comes_the_limit_is_that_of_the_samples():
     rare = rare_violations(distribution, [0], samples=200)
     assert not rare.resolved[0]
     assert rare.upper[0] == pytest.approx(3 / distribution.diagnosis.effective)
+
+
+def test_paths_that_come_nearest_at_their_start_are_led_on():
+    """All begin upwards, and the region is below: it is a rise of what is mirrored."""
+    bridge = hill(np.random.default_rng(2))
+    passage, height = bridge.passage, bridge.passage.start[0] - 0.3
+    goal = Box(-passage.goal.upper, -passage.goal.lower)
+    mirrored = Bridge(replace(passage, start=-passage.start, goal=goal))
+    exact = mirrored.chance_of_rise(-height, 4000, np.random.default_rng(1))
+    below = Regions(WIDE.space, [[-50.0, -np.inf]], [[height, np.inf]])
+    rare = rare_violations(sampled(bridge, below), [0])
+    assert exact < 1e-4
+    assert rare.resolved[0]
+    assert abs(rare.phi[0] - exact) < 3 * np.hypot(rare.error[0], 0.03 * exact)
+
+
+def test_the_limit_of_a_resolved_region_is_its_own():
+    """Far below the one of the task's samples, of which three or so would have to cross."""
+    bridge = hill(np.random.default_rng(2))
+    distribution = sampled(bridge, above([bridge.passage.goal.upper[0] + 0.8]))
+    rare = rare_violations(distribution, [0])
+    assert rare.resolved[0]
+    assert rare.upper[0] < 0.5 * 3 / distribution.diagnosis.effective
+    np.testing.assert_allclose(rare.upper, rare.phi + ndtri(0.95) * rare.error, rtol=1e-3)
+
+
+def test_a_probability_is_believed_with_enough_samples_and_a_light_tail():
+    many, light = np.array([50.0, 50.0, 49.9, 49.9]), np.array([0.7, 0.71, 0.7, 0.71])
+    rare = RareViolations(np.arange(4), *np.full((2, 4), 1e-4), many, light, np.full(4, 1e-3))
+    assert rare.resolved.tolist() == [True, False, False, False]
 
 
 def test_what_cannot_be_is_refused():
