@@ -13,7 +13,7 @@ which is not alpha_i alpha_j, as who may not push goes other ways. Evidence is t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from mlci.actuation.inference import ControlInference
 from mlci.actuation.moves import ControlledMoves
 from mlci.demonstrations import Demonstration
-from mlci.evidence import Rates, log_evidence, total_gain
+from mlci.evidence import DEFAULT_MODEL_ERROR, Rates, log_evidence, total_gain
 from mlci.inference import Inference
 from mlci.regions import as_mask
 from mlci.spaces import Bools, Floats, Ints
@@ -171,7 +171,8 @@ def infer_joint(
         controls: what they say of the J hypotheses about controls.
         kinds: prior probability of each of `KINDS`.
         rates: model error and rule breaking; those of `inference` by default. A calibration of
-            either inference says nothing of pairs, and does not count.
+            either inference says nothing of pairs and does not count: `DEFAULT_MODEL_ERROR` of
+            `mlci.evidence` takes its place.
         hypotheses: (C',) mask over the model's regions, as of `mlci.infer`.
         exact_ends: as of `mlci.infer`.
         round_horizon: likewise.
@@ -190,6 +191,10 @@ def infer_joint(
     alpha = moves.joint_avoidance(
         [each.task for each in demonstrations], exact_ends=exact_ends, round_horizon=round_horizon
     )[:, np.append(mask, True)]
+    if rates is None:
+        rates = inference.rates
+        if inference.calibration is not None:
+            rates = replace(rates, model_error=DEFAULT_MODEL_ERROR)
     silent = np.pad(inference.decided_by_cell, ((0, 0), (0, 1)))
     alpha = np.where(silent[:, :, None], alpha[:, -1:], alpha)
     entered = np.pad(inference.violated, ((0, 0), (0, 1)))
@@ -200,5 +205,5 @@ def infer_joint(
         alpha,
         entered[:, :, None] | applied[:, None, :],
         kinds,
-        inference.rates if rates is None else rates,
+        rates,
     )

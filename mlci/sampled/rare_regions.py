@@ -91,9 +91,9 @@ def rare_violations(
     found = [_of_region(distribution, number, samples) for number in numbers.tolist()]
     phi, error, effective, pareto_k = np.reshape(found, (len(numbers), 4)).T
     own = min(1.0, 3 / distribution.diagnosis.effective)
-    upper = phi + _LIMIT * error
+    phi, upper = np.minimum([phi, phi + _LIMIT * error], 1.0)  # sums of weights may be more
     upper = np.where(_resolved(effective, pareto_k), upper, np.maximum(upper, own))
-    return RareViolations(numbers, phi, error, effective, pareto_k, np.minimum(upper, 1.0))
+    return RareViolations(numbers, phi, error, effective, pareto_k, upper)
 
 
 def _resolved(effective: Floats, pareto_k: Floats) -> Bools:

@@ -15,6 +15,7 @@ from mlci.actuation.moves import ControlledMoves
 from mlci.actuation.ranges import ControlRanges
 from mlci.demonstrations import Demonstration, Task
 from mlci.evidence import Rates
+from mlci.forecasts import ForecastCurve, ForecastMap
 from mlci.grids import Grid
 from mlci.maxent import TrajectoryDistribution
 from mlci.preparation import infer
@@ -134,6 +135,17 @@ def test_options_count_for_pairs_as_for_the_inferences_of_one() -> None:
         assert 0.1 < alpha < 0.9
         expected = 0.1 if entered else 0.9 / (0.8 * alpha + 0.2) + 0.1
         assert joint.gain[1, -1] == pytest.approx(np.log(expected))
+
+
+def test_a_calibration_does_not_make_pairs_surer_than_no_calibration() -> None:
+    """It scored forecasts of one region: the model error that it takes the place of counts again."""
+    seen = demonstration([1, 2, 2, 3], "round")
+    controls = infer_controls(MODEL, [seen], RANGES)
+    curve = ForecastCurve((1e-6, 1.0), 9, 99, 0.0, 0.0, 0.0, ceiling=0.6)
+    calibrated = infer(MODEL, [seen], calibration=ForecastMap((curve,)))
+    assert calibrated.rates.model_error == 0
+    plain = infer_joint(MODEL, [seen], infer(MODEL, [seen]), controls)
+    np.testing.assert_array_equal(infer_joint(MODEL, [seen], calibrated, controls).gain, plain.gain)
 
 
 def test_what_a_cell_decides_adds_nothing_to_controls() -> None:

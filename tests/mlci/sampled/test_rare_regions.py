@@ -164,3 +164,11 @@ def test_what_cannot_be_is_refused():
     nothing = replace(model, limit=Box([-0.01], [0.01])).distribution(far)
     with pytest.raises(ValueError, match="no sampled path reaches the goal"):
         rare_violations(nothing, [0])
+
+
+def test_phi_is_no_more_than_1_where_a_region_is_not_rare() -> None:
+    bridge = random_bridge(np.random.default_rng(1))
+    start = bridge.passage.start
+    around = Regions(WIDE.space, [start - 0.2], [start + 0.2])
+    rare = rare_violations(sampled(bridge, around), [0], samples=1500)
+    assert rare.phi[0] == rare.upper[0] == 1
