@@ -18,6 +18,7 @@ import pandas as pd
 import mlci.safety.reachability
 from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
+from experiments.point.keep_out import derived_margin
 from experiments.point.stages import region_inputs, shape_modules, system_module
 from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
@@ -26,7 +27,7 @@ from mlci.demonstrator import enters, first_guesses
 from mlci.grids import Grid
 from mlci.regions import Regions
 from mlci.safety.reachability import SafeSet, solve_safe_set
-from mlci.safety.safety_filter import SafetyFilter, border_margin
+from mlci.safety.safety_filter import SafetyFilter
 from mlci.simulate import EULER, step_count
 from mlci.spaces import Bools, Floats
 from mlci.strength import WithStrength
@@ -90,7 +91,7 @@ class _Deployment:
             margin = self.settings.safety.margin
             if margin is None:
                 system = WithStrength(self.settings.model, strength)
-                margin = border_margin(system, safe_set, self.dt)
+                margin = derived_margin(system, safe_set, self.dt)
             keep_out = SafetyFilter(self.system, safe_set, self.dt, margin)
             starts = self._starts(safe_set, margin)
             yield (
