@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any, TypeVar
 
 import omegaconf
@@ -56,6 +55,7 @@ from experiments.config.truth_checks import (
     safe_set_problems,
     truth_problems,
 )
+from experiments.tracking.files import make_writable
 from experiments.tracking.trees import flatten
 
 __all__ = [
@@ -184,9 +184,8 @@ def writable_results(settings: HasResults) -> Path:
     """
     folder = results_folder(settings)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=folder):
-            return folder
+        make_writable(folder)
+        return folder
     except OSError as error:
         raise ConfigError(
             f"results: nothing can be written into {folder} ({error.strerror}); name a folder of "

@@ -12,6 +12,7 @@ from experiments.field.contest import contest
 from experiments.field.entries import EntryError
 from experiments.field.page import write_results
 from experiments.field.published import false_shares
+from experiments.tracking.files import make_writable
 
 SEEDS = 7  # about three processor minutes each
 _DRAWS = 5  # sets of demonstrations beside published numbers, for each seed: they are cheap
@@ -22,7 +23,8 @@ def main(arguments: list[str] | None = None) -> int:
     """Run what is missing, then write tables, picture and page."""
     parser = _parser()
     options = parser.parse_args(arguments)
-    if min(options.seeds, options.demonstrations or 1) < 1:
+    shown = options.demonstrations
+    if min(options.seeds, 1 if shown is None else shown) < 1:
         parser.error("--seeds and --demonstrations are at least 1")
     if options.workers == 0:
         parser.error("--workers is a number of processes, or -1 for one a core; not 0")
@@ -38,7 +40,13 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     print(f"{len(worlds)} worlds, {len(methods)} methods, {options.seeds} seeds", flush=True)
     seeds = range(options.seeds)
-    shown = options.demonstrations
+    try:
+        make_writable(options.out)
+    except OSError as error:
+        parser.error(
+            f"--out: nothing can be written into {options.out} ({error.strerror}); name a folder "
+            "of your own"
+        )
     try:
         runs = contest(options.out, worlds, methods, seeds, added, options.workers, shown)
     except EntryError as error:

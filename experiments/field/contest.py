@@ -95,7 +95,7 @@ def _rows(
                 case = case or _made(catalog.worlds[world], seed, count)
                 who = f"method {name} in world {world}, seed {seed}"
                 scores = _played(catalog.methods[name], case, [seed, *map(_number, (world, name))])
-            except Exception as error:  # it may be anybody's code
+            except (Exception, SystemExit) as error:  # it may be anybody's code
                 failures.append(f"{who} fails: {_what(error)}")
                 if case is None:
                     break
@@ -132,7 +132,7 @@ def _number(name: str) -> int:
     return crc32(name.encode())
 
 
-def _what(error: Exception) -> str:
+def _what(error: Exception | SystemExit) -> str:
     """An error in one line, with the place in the code unless the message says all."""
     if isinstance(error, EntryError):
         return str(error)

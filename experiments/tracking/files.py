@@ -18,6 +18,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
 if TYPE_CHECKING:
@@ -29,6 +30,17 @@ _EXCHANGE, _HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux
 _STEP = 2_000_000_000  # [ns] the coarsest that a file system's clock has: that of FAT
 
 _digests: dict[str, tuple[list[int], str]] = {}  # stamps and digests of files, in this process
+
+
+def make_writable(folder: Path) -> None:
+    """Make a folder if need be, and see that a file can be written there.
+
+    Raises:
+        OSError: none can.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryFile(dir=folder):
+        pass
 
 
 def digest(data: bytes) -> str:

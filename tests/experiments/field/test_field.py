@@ -341,6 +341,32 @@ def test_answers_that_say_nothing_are_refused(
             main(wrong)
 
 
+def test_no_demonstrations_and_a_folder_that_cannot_be_written_are_refused_before_any_world(
+    mine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    arguments = ["--add", str(mine), "--worlds", "row", "--methods", "middle", "--seeds", "1"]
+    for wrong, message in (
+        (["--demonstrations", "0"], "--demonstrations are at least 1"),
+        (["--out", str(tmp_path / "file" / "r")], "--out: nothing can be written into"),
+    ):
+        with pytest.raises(SystemExit) as stopped:
+            main([*arguments, "--workers", "1", "--out", str(tmp_path / "r"), *wrong])
+        assert stopped.value.code == 2
+        assert message in capsys.readouterr().err
+    assert not (tmp_path / "r").exists()
+
+
+def test_a_method_that_ends_the_program_has_failed(
+    mine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ending, rule = tmp_path / "ending.py", "scores = -np.abs(place - place.mean())"
+    ending.write_text(mine.read_text().replace(rule, "raise SystemExit(0)"))
+    arguments = ["--add", str(ending), "--worlds", "row", "--methods", "middle", "--seeds", "1"]
+    assert main([*arguments, "--workers", "1", "--out", str(tmp_path / "r")]) == 2
+    assert "method middle in world row, seed 0 fails: SystemExit" in capsys.readouterr().err
+
+
 def test_a_method_that_fails_is_named_and_the_others_go_on(
     mine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
