@@ -59,7 +59,12 @@ class Baseline:
             demonstrations: at least one.
             paths: sampled paths for each task.
             rng: of these paths.
+
+        Raises:
+            ValueError: no demonstrations, or no paths where some are needed.
         """
+        if not demonstrations:
+            raise ValueError("a score needs demonstrations, and there are none")
         entered = [model.regions.violated_by(each.states) for each in demonstrations]
         scores = self.combine(self.parts(model, demonstrations, paths, rng))
         return np.where(np.any(entered, axis=0), -np.inf, scores)
@@ -112,7 +117,12 @@ def crossings(
     """(N, C) share of sampled unconstrained paths of each task that cross each region.
 
     Paths go from cell to cell; 0 where the tabular agent cannot do the task.
+
+    Raises:
+        ValueError: no paths.
     """
+    if paths < 1:
+        raise ValueError(f"crossings are counted over 1 path of a task or more, not {paths}")
     found = np.zeros((len(demonstrations), len(model.regions)))
     for row, demonstration in zip(found, demonstrations, strict=True):
         distribution = _distribution(model, demonstration)

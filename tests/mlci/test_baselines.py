@@ -94,3 +94,12 @@ def test_a_task_that_cannot_be_done_says_nothing() -> None:
     model = replace(model, kept=stuck)
     assert not crossings(model, [shown], 10, np.random.default_rng(0)).any()
     assert visits(model, [shown])[0].tolist() == [-STEPS - 1, 0, 0, 0, 0]
+
+
+def test_nothing_is_scored_by_no_demonstrations_or_no_paths() -> None:
+    model, rng = world(), np.random.default_rng(0)
+    for baseline in BASELINES.values():
+        with pytest.raises(ValueError, match="needs demonstrations, and there are none"):
+            baseline.score(model, [], 5, rng)
+    with pytest.raises(ValueError, match="1 path of a task or more, not 0"):
+        BASELINES["crossings"].score(model, [demonstration([0.5, 4.5])], 0, rng)
