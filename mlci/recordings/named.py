@@ -156,8 +156,9 @@ def _refuse_missing(
     example = f"columns={{{missing[-1]}: {offered[0] if offered else 'NAME'}}}"
     array = f" (or columns={{{STATES}: NAME}} for an array of all)" if len(missing) > 1 else ""
     without = f"; without time, time_unit={SAMPLES}" if missing == ["time"] else ""
+    sought = [layout.columns.get(name, name) for name in missing]
     raise ValueError(
-        f"has no column {' or '.join(missing)} in its header ({shortened(names)}): it needs "
+        f"has no column {' or '.join(sought)} in its header ({shortened(names)}): it needs "
         f"{', '.join(['time', *space.names])}; if they have other names there, say so, as in "
         f"{example}{array}{without}"
     )

@@ -104,7 +104,7 @@ def message(path: Path, **options: object) -> str:
         ("time,angle,angle", {}, "has 2 columns 'angle' (angle, angle): rename or remove all but"),
         ("when,angle,angular_velocity", {}, "no column time in its header (when, angle, angular"),
         ("time,angle,omega", {}, "say so, as in columns={angular_velocity: omega}"),
-        ("time,angle,omega", {"columns": {"angle": "phi"}}, "no column angle or angular_velocity"),
+        ("time,angle,omega", {"columns": {"angle": "phi"}}, "no column phi or angular_velocity"),
     ],
 )
 def test_names_and_units_that_do_not_fit_are_refused(
