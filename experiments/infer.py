@@ -103,7 +103,7 @@ def infer(settings: RecordedSettings) -> int:
         why = "; the lines above say why" if problems else ""
         print(f"no demonstration could be used{why}")
         return FAILED
-    results = writable_results(settings)
+    results = writable_results(settings, "inference")
     if settings.next_tasks.count:
         candidate_tasks(settings, 1.0)  # a table that cannot be used is refused before the work
     checks = plausibilities(settings, demonstrations)

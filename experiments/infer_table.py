@@ -58,7 +58,7 @@ def infer_table(settings: TableSettings) -> int:
     if not paths:
         print("no demonstration could be used")
         return FAILED
-    writable_results(settings)
+    writable_results(settings, "inference")
     begin(f"ranking {len(world.table.regions)} hypotheses")
     rates = Rates(settings.inference.model_error, settings.inference.rule_breaking)
     try:

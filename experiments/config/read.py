@@ -176,20 +176,24 @@ def read_advice_config(tree: Mapping[str, Any]) -> AdviceSettings:
     return settings
 
 
-def writable_results(settings: HasResults) -> Path:
-    """The folder of results, made if need be, in which a file could be written just now.
+def writable_results(settings: HasResults, part: str) -> Path:
+    """The folder of results, made if need be, in a part of which a file could be written just now.
+
+    Args:
+        settings: name the folder.
+        part: the folder in it that is written to; another user may have made it.
 
     Raises:
         ConfigError: nothing can be written there, which is best known before hours of work.
     """
     folder = results_folder(settings)
     try:
-        make_writable(folder)
+        make_writable(folder / part)
         return folder
     except OSError as error:
         raise ConfigError(
-            f"results: nothing can be written into {folder} ({error.strerror}); name a folder of "
-            "your own: results=FOLDER"
+            f"results: nothing can be written into {folder / part} ({error.strerror}); name a "
+            "folder of your own: results=FOLDER"
         ) from None
 
 

@@ -65,7 +65,7 @@ class Planner(Sweeper):
         options, folder = study.sweep, results_folder(study) / (study.study or _own_name(plan))
         selection = select_points(plan, options)
         if not options.dry_run:
-            writable_results(study)
+            writable_results(study, "points")
         print(
             f"{counted(len(plan), 'point')}: {count_states(plan)}; {len(selection)} to run",
             flush=True,

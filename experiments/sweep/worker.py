@@ -32,7 +32,7 @@ def run_single(tree: dict[str, Any]) -> None:
         print(read_file(point.folder / "log.txt").decode(errors="replace"), end="")
         print(f"finished before: {point.folder}")
     else:
-        writable_results(study)
+        writable_results(study, "points")
         if point.is_running():
             print(f"another process runs this point, and is waited for: {point.folder}")
         with steps_shown():

@@ -463,16 +463,17 @@ def test_sweep_that_cannot_be_is_refused(
     assert message in refusal(arguments, monkeypatch, capsys)
 
 
-@pytest.mark.parametrize("name", ["file", "file/inside"])
+@pytest.mark.parametrize("name", ["file", "file/inside", "."])
 def test_results_that_cannot_be_written_are_refused_before_any_work(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "file").write_text("")
-    message = f"results: nothing can be written into {tmp_path / name} ("
+    for taken in ("file", "points"):
+        (tmp_path / taken).write_text("")
+    message = f"results: nothing can be written into {tmp_path / name / 'points'} ("
     for words in ([], ["-m", "dt=0.5,1.0"]):
         words = [*words, "scale=smoke", f"results={tmp_path / name}"]
         assert message in refusal(words, monkeypatch, capsys)
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "points"]
 
 
 HIDDEN = [
