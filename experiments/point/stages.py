@@ -21,6 +21,7 @@ import mlci.shapes.balls
 import mlci.shapes.half_spaces
 import mlci.tabular
 from experiments.config.settings import ESCAPES, ModelSettings, Settings, ShapeList, SubjectSettings
+from experiments.point.no_answer import NoAnswer
 from experiments.terminal import entry
 from experiments.tracking.store import Store, Stored
 from mlci.cells.refined_model import RefinedModel
@@ -29,7 +30,7 @@ from mlci.models import Model
 from mlci.paths import substep_count
 from mlci.regions import Regions
 from mlci.safety.constant_controls import tabulate_escapes
-from mlci.safety.reachability import SafeSet, solve_safe_set
+from mlci.safety.reachability import NotSettled, SafeSet, solve_safe_set
 from mlci.sampled.model import SampledModel
 from mlci.single_moves import SingleMoves
 from mlci.systems import System
@@ -64,12 +65,32 @@ def safe_set(settings: Settings, store: Store) -> tuple[SafeSet, str]:
         if source is escapes:
             safe = tabulate_escapes(system, grid, truth, horizon=settings.horizon)
         else:
-            safe = solve_safe_set(system, grid, truth)
+            safe = settled_safe_set(system, grid, truth, "safety.method: equation")
         return {"values": safe.values, "gradients": safe.gradients}
 
     modules = [source, system_module(settings.model), *shape_modules(settings, settings.constraint)]
     stored = store.get("safe_set", safe_set_inputs(settings), modules, compute)
     return SafeSet(grid, stored["values"], stored["gradients"]), stored.key
+
+
+def settled_safe_set(system: System, grid: Grid, region: Regions, asked: str) -> SafeSet:
+    """The safe set of a region on a grid, as the config asks in some words.
+
+    Raises:
+        NoAnswer: there is none within the longest time that is tried.
+    """
+    try:
+        return solve_safe_set(system, grid, region)
+    except NotSettled as error:
+        raise NoAnswer(
+            f"{asked}: no safe set is found where controls reach {_ends(system)}: {error}; take "
+            "stronger controls, or fewer cells in safety.shape"
+        ) from error
+
+
+def _ends(system: System) -> str:
+    """The largest controls of a system, as one reads them."""
+    return ", ".join(f"{each:g}" for each in system.control_box.upper)
 
 
 def inference_model(settings: Settings, store: Store) -> Model:

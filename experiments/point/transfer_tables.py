@@ -19,14 +19,19 @@ import mlci.safety.reachability
 from experiments.config.settings import Settings
 from experiments.point.inference import PointInference
 from experiments.point.keep_out import derived_margin
-from experiments.point.stages import region_inputs, shape_modules, system_module
+from experiments.point.stages import (
+    region_inputs,
+    settled_safe_set,
+    shape_modules,
+    system_module,
+)
 from experiments.point.streams import Purpose, stream
 from experiments.tracking.store import Store
 from mlci.control.control_problem import ControlFilter, NoFilter
 from mlci.demonstrator import enters, first_guesses
 from mlci.grids import Grid
 from mlci.regions import Regions
-from mlci.safety.reachability import SafeSet, solve_safe_set
+from mlci.safety.reachability import SafeSet
 from mlci.safety.safety_filter import SafetyFilter
 from mlci.simulate import EULER, step_count
 from mlci.spaces import Bools, Floats
@@ -153,7 +158,8 @@ def _solved(settings: Settings, store: Store, region: Regions, strength: float) 
     grid = Grid(settings.model.space, settings.safety.shape)
 
     def compute() -> dict[str, np.ndarray]:
-        safe = solve_safe_set(WithStrength(settings.model, strength), grid, region)
+        system, asked = WithStrength(settings.model, strength), f"transfer.strengths: {strength:g}"
+        safe = settled_safe_set(system, grid, region, asked)
         return {"values": safe.values, "gradients": safe.gradients}
 
     of_region = region.names, region_inputs(settings, region)

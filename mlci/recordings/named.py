@@ -72,12 +72,18 @@ def to_recording(table: Table, system: System, layout: Layout) -> Recording:
 
 def _state_places(headers: Sequence[str], space: StateSpace, layout: Layout) -> dict[str, int]:
     """Positions of the states that are there: by their names, or as entries of one array."""
-    places = {}
+    places: dict[str, int] = {}
     array = layout.columns.get(STATES, STATES)
     for d, name in enumerate(space.names):
         place = position(name, headers, layout.columns.get(name))
         if place is None and name not in layout.columns:
             place = position(f"{array}[{d}]", headers)
+        for other, taken in places.items():
+            if taken == place:
+                raise ValueError(
+                    f"column {headers[taken]!r} is named for {other} and for {name}: columns= "
+                    "needs a column for each"
+                )
         if place is not None:
             places[name] = place
     entries = [header for header in headers if header.startswith(f"{array}[")]

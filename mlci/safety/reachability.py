@@ -113,6 +113,10 @@ class SafeSet:
         return np.where(rises > 0, upper, lower)
 
 
+class NotSettled(RuntimeError):
+    """A safe set that `solve_safe_set` did not find, as V falls on and on."""
+
+
 def solve_safe_set(
     system: System,
     grid: Grid,
@@ -141,7 +145,7 @@ def solve_safe_set(
         ValueError: a horizon below 0, a tolerance that is not positive, a region that is
             everything or so small that the grid misses it, or dynamics that are not affine in the
             control.
-        RuntimeError: no fixed point within 100 s of tau.
+        NotSettled: no fixed point within 100 s of tau.
     """
     if horizon is not None and not horizon >= 0:
         raise ValueError(f"a horizon must be at least 0 s, not {horizon}")
@@ -180,7 +184,7 @@ def solve_safe_set(
             break
     else:
         if horizon is None:
-            raise RuntimeError(
+            raise NotSettled(
                 f"V still falls by {change:.2g} per second after {_LONGEST:g} s, more than the "
                 f"tolerance {tolerance:g}"
             )

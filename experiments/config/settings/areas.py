@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic.dataclasses import dataclass
 
 from experiments.config.settings.cells import Shape
-from experiments.config.settings.kinds import STRICT, CountOrNone, NotNegative, Number, about
+from experiments.config.settings.kinds import STRICT, CountOrNone, LogOdds, Weight, about
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -20,9 +20,9 @@ class AreaSettings:
     ]
     demonstrations: Annotated[Shape, about("so many demonstrations a subset")]
     adjacency: Annotated[
-        NotNegative,
+        Weight,
         about("how much more probable a set is for each pair of neighbours in it", "nat"),
     ]
     log_odds: Annotated[
-        Number, about("prior log odds of a hypothesis without neighbours in the set", "nat")
+        LogOdds, about("prior log odds of a hypothesis without neighbours in the set", "nat")
     ]

@@ -10,7 +10,7 @@ from experiments.config.settings.cells import Shape
 from experiments.config.settings.kinds import (
     STRICT,
     Count,
-    Positive,
+    Strength,
     Weight,
     about,
 )
@@ -39,7 +39,7 @@ class TransferSettings:
     """Does what was inferred hold where the controls are stronger or weaker?"""
 
     strengths: Annotated[
-        tuple[Positive, ...],
+        tuple[Strength, ...],
         about(
             "the inferred region is kept out of by systems with so many times the control ranges; "
             "none asks nothing"

@@ -47,7 +47,9 @@ _READ = BeforeValidator(read_number)
 Number = Annotated[float, _READ]
 Positive = Annotated[float, Field(gt=0), _READ]
 NotNegative = Annotated[float, Field(ge=0), _READ]
-Weight = Annotated[float, Field(ge=0, le=1e6), _READ]  # [nat/s]; a wall is far below
+Weight = Annotated[float, Field(ge=0, le=1e6), _READ]  # [nat/s] or [nat]; a wall is far below
+LogOdds = Annotated[float, Field(ge=-1e6, le=1e6), _READ]  # [nat]
+Strength = Annotated[float, Field(ge=0.01, le=100), _READ]  # times a control range
 SizePower = Annotated[float, Field(ge=0, le=LARGEST_POWER), _READ]
 HalfWidth = Annotated[float, Field(gt=0, le=0.5), _READ]  # share of a range
 Share = Annotated[float, Field(ge=0, lt=1), _READ]

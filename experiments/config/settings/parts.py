@@ -22,6 +22,7 @@ from experiments.config.settings.kinds import (
     Share,
     ShareOrEstimate,
     SizePower,
+    Weight,
     about,
 )
 from experiments.config.settings.shapes import Region
@@ -123,7 +124,7 @@ class SetSettings:
         about("factor of the prior for each further hypothesis of a set, after the first"),
     ]
     adjacency: Annotated[
-        NotNegative,
+        Weight,
         about("how much more probable a set is for each pair of neighbours in it", "nat"),
     ]
     steps: Annotated[

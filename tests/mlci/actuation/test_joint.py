@@ -138,7 +138,7 @@ def test_options_count_for_pairs_as_for_the_inferences_of_one() -> None:
 
 
 def test_a_calibration_does_not_make_pairs_surer_than_no_calibration() -> None:
-    """It scored forecasts of one region: the model error that it takes the place of counts again."""
+    """It scored forecasts of one region: the model error whose place it takes counts again."""
     seen = demonstration([1, 2, 2, 3], "round")
     controls = infer_controls(MODEL, [seen], RANGES)
     curve = ForecastCurve((1e-6, 1.0), 9, 99, 0.0, 0.0, 0.0, ceiling=0.6)

@@ -105,6 +105,11 @@ def message(path: Path, **options: object) -> str:
         ("when,angle,angular_velocity", {}, "no column time in its header (when, angle, angular"),
         ("time,angle,omega", {}, "say so, as in columns={angular_velocity: omega}"),
         ("time,angle,omega", {"columns": {"angle": "phi"}}, "no column phi or angular_velocity"),
+        (
+            "time,angle,angular_velocity",
+            {"columns": {"angular_velocity": "angle"}},
+            "column 'angle' is named for angle and for angular_velocity: columns= needs a column",
+        ),
     ],
 )
 def test_names_and_units_that_do_not_fit_are_refused(
