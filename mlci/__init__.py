@@ -173,7 +173,7 @@ __all__ = [
     "write_demonstration",
 ]
 
-__version__ = "0.9.0"
+__version__ = "0.10.0"
 
 
 def __getattr__(name: str) -> Any:
