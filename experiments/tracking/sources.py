@@ -186,18 +186,18 @@ def _is_silent(node: ast.AST) -> bool:
     return False
 
 
+@cache
 def _find(name: str) -> ModuleSpec | None:
     """Where a module is, looked up without running the packages that it is in."""
-    top, *inner = name.split(".")
+    package, _, _ = name.rpartition(".")
+    if package:
+        spec = _find(package)
+        folders = None if spec is None else spec.submodule_search_locations
+        return None if folders is None else PathFinder.find_spec(name, folders)
     try:
-        spec = importlib.util.find_spec(top)
+        return importlib.util.find_spec(name)
     except (ImportError, ValueError):
         return None
-    for part in inner:
-        if spec is None or spec.submodule_search_locations is None:
-            return None
-        spec = PathFinder.find_spec(f"{spec.name}.{part}", spec.submodule_search_locations)
-    return spec
 
 
 @cache
@@ -207,3 +207,7 @@ def _module_names(package: str) -> frozenset[str]:
     folders = spec.submodule_search_locations if spec else None
     paths = [path for folder in folders or () for path in Path(folder).iterdir()]
     return frozenset(f"{package}.{path.stem}" for path in paths if path.suffix in ("", ".py"))
+
+
+# What a process remembers of sources, for who changes them while it runs.
+CACHES = (_hash, _read_source, _module_names, _neighbours, _find)

@@ -31,7 +31,7 @@ MAINS = {
     "mlci-figures": figures.main,
     "mlci-results": results.main,
 }
-CACHES = (sources._hash, sources._read_source, sources._module_names, sources._neighbours)
+
 SMALL = ["grid.shape=[8,8,8]"]
 SMOKE = {
     "mlci-run": [
@@ -63,7 +63,7 @@ def command(folder: Path, line: str) -> tuple[int, str, str]:
     """
     name, *words = line.split()
     sys.modules.pop("forklift", None)
-    for cached in CACHES:
+    for cached in sources.CACHES:
         cached.cache_clear()
     usual = signal.getsignal(signal.SIGTERM)
     try:
@@ -123,7 +123,7 @@ def test_source_counts_what_a_module_imports_from_beside_it(
     for helper, other in (("a = 1", "b = 1"), ("a = 2", "b = 1"), ("a = 2", "b = 2")):
         (tmp_path / "beside_it.py").write_text(helper)
         (tmp_path / "not_imported.py").write_text(other)
-        for cached in CACHES:
+        for cached in sources.CACHES:
             cached.cache_clear()
         hashes.append(Point.planned({"system": {"target": "mine_own.Mine"}}, tmp_path).source)
     assert hashes[0] != hashes[1] == hashes[2]

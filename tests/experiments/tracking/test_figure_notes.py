@@ -70,7 +70,7 @@ def test_figure_is_out_of_date_once_a_source_changes(
         (tmp_path / file).unlink()
     else:
         (tmp_path / file).write_text(text)
-    for cached in (sources._hash, sources._read_source, sources._module_names):
+    for cached in sources.CACHES:
         cached.cache_clear()
     assert concerns(study) == {"curve_c1": reasons}
 

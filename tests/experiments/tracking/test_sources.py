@@ -18,7 +18,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def hashed(*modules: str) -> str:
     """The hash as a new process has it."""
-    for cached in (sources._hash, sources._read_source, sources._module_names, sources._neighbours):
+    for cached in sources.CACHES:
         cached.cache_clear()
     return source_hash(modules)
 
