@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from paper_figures.report.means import Mean, share
 from paper_figures.rows import Unsuited
-from paper_figures.style import GUIDE, PAGE, RC, SIX_COLOURS, SIX_MARKS, new_figure
+from paper_figures.style import GUIDE, PAGE, RC, SIX_COLOURS, SIX_MARKS, new_figure, whiskers
 
 TABLES = {
     "models": (
@@ -99,7 +99,7 @@ def _draw_shares(axes: Axes, rows: pd.DataFrame, names: list[str]) -> None:
             axes.errorbar(
                 [number + shift],
                 [100 * mean.value],
-                [[100 * (mean.value - mean.low)], [100 * (mean.high - mean.value)]],
+                whiskers([100 * mean.value], [100 * mean.low], [100 * mean.high]),
                 color=SIX_COLOURS[-1 - number],
                 marker=SIX_MARKS[number],
                 markerfacecolor="white" if first == 1 else SIX_COLOURS[-1 - number],
@@ -133,7 +133,7 @@ def _draw_forecasts(axes: Axes, forecasts: pd.DataFrame, names: list[str]) -> No
         axes.errorbar(
             some["forecast"],
             some["crossed"],
-            [some["crossed"] - some["low"], some["high"] - some["crossed"]],
+            whiskers(some["crossed"], some["low"], some["high"]),
             color=SIX_COLOURS[-1 - number],
             marker=SIX_MARKS[number],
             elinewidth=0.5,

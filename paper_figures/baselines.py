@@ -19,6 +19,7 @@ from paper_figures.style import (
     STEP_COLOURS,
     TRUTH,
     new_figure,
+    whiskers,
 )
 
 TABLES = {
@@ -64,8 +65,8 @@ def draw(baseline_differences: pd.DataFrame) -> Figure:
             style = {"color": colour, "marker": marker, "markersize": 3.5, "elinewidth": 0.7}
             for axes, name, change in ((top, "top", _percent), (rank, "log_rank", _rank)):
                 middle, low, high = (change(own[f"{name}{end}"]) for end in ("", "_low", "_high"))
-                errors = [(middle - low).clip(lower=0), (high - middle).clip(lower=0)]
-                axes.errorbar(x, middle, yerr=errors, label=label, linewidth=1, **style)
+                lengths = whiskers(middle, low, high)
+                axes.errorbar(x, middle, yerr=lengths, label=label, linewidth=1, **style)
         for axes in (top, rank):
             axes.set_xscale("log")
             ticks = sorted(rows["demonstrations"].unique())

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paper_figures.rows import Unsuited
-from paper_figures.style import GUIDE, PAGE, RC, STEP_COLOURS, STEP_MARKS, new_figure
+from paper_figures.style import GUIDE, PAGE, RC, STEP_COLOURS, STEP_MARKS, new_figure, whiskers
 
 _KEYS = ("source", "demonstrations", "belief", "bin")
 TABLES = {
@@ -50,13 +50,11 @@ def draw(reliability: pd.DataFrame) -> Figure:
                 for place, number in enumerate(numbers):
                     style = place % len(STEP_MARKS)
                     curve = panel[(panel["demonstrations"] == number) & _enough(panel)]
-                    errors = np.array(
-                        [curve["observed"] - curve["low"], curve["high"] - curve["observed"]]
-                    )
+                    lengths = whiskers(curve["observed"], curve["low"], curve["high"])
                     axes.errorbar(
                         100 * curve["predicted"],
                         100 * curve["observed"],
-                        yerr=100 * np.maximum(errors, 0),
+                        yerr=100 * lengths,
                         color=STEP_COLOURS[style],
                         marker=STEP_MARKS[style],
                         markersize=3,

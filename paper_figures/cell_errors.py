@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.rows import Unsuited
-from paper_figures.style import GUIDE, PAGE, RC, SIX_COLOURS, SIX_MARKS, new_figure
+from paper_figures.style import GUIDE, PAGE, RC, SIX_COLOURS, SIX_MARKS, new_figure, whiskers
 
 TABLES = {
     "resolution": (
@@ -100,7 +100,7 @@ def draw(resolution: pd.DataFrame) -> Figure:
                 axes.errorbar(
                     some["count"],
                     some["error"],
-                    [some["error"] - some["low"], some["high"] - some["error"]],
+                    whiskers(some["error"], some["low"], some["high"]),
                     color=colour,
                     marker=mark,
                     linewidth=1.0,

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from paper_figures.rows import Unsuited, paper_rows
-from paper_figures.style import VIOLATED, mark
+from paper_figures.style import VIOLATED, mark, whiskers
 
 COLUMNS = (
     *("truth", "cells", "actions", "dt", "samples"),
@@ -52,7 +52,7 @@ def draw_curves(axes: Axes, rows: pd.DataFrame) -> None:
             axes.errorbar(
                 x[part.index],
                 part["mean"],
-                yerr=(part["mean"] - part["low"], part["high"] - part["mean"]),
+                yerr=whiskers(part["mean"], part["low"], part["high"]),
                 linestyle="",
                 capsize=1.5,
                 elinewidth=0.7,
@@ -134,7 +134,7 @@ def draw_dots(axes: Axes, values: pd.DataFrame, y: pd.Series, style: dict[str, s
     axes.errorbar(
         middle,
         y,
-        xerr=[(middle - low).clip(lower=0), (high - middle).clip(lower=0)],
+        xerr=whiskers(middle, low, high),
         linestyle="none",
         markersize=3,
         elinewidth=0.8,

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from paper_figures.style import DEMONSTRATION, GUIDE, PAGE, RC, TRUTH, new_figure
+from paper_figures.style import DEMONSTRATION, GUIDE, PAGE, RC, TRUTH, new_figure, whiskers
 
 _ENDS = ("", "_low", "_high")
 TABLES = {
@@ -116,8 +116,8 @@ def _by_system(axes: Axes, forecasts: pd.DataFrame) -> None:
 def _rows(axes: Axes, names: list[str], middle: pd.Series, low: pd.Series, high: pd.Series) -> None:
     """A row a name: a value with its interval."""
     numbers = np.arange(len(names))
-    errors = [(middle - low).clip(lower=0), (high - middle).clip(lower=0)]
-    axes.errorbar(middle, numbers, xerr=errors, fmt="o", color=DEMONSTRATION, elinewidth=0.8)
+    lengths = whiskers(middle, low, high)
+    axes.errorbar(middle, numbers, xerr=lengths, fmt="o", color=DEMONSTRATION, elinewidth=0.8)
     if names:
         axes.set_yticks(numbers, labels=names)
         axes.set_ylim(len(names) - 0.5, -0.5)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import matplotlib.pyplot as plt
-import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.rows import Unsuited
-from paper_figures.style import COLUMN, GUIDE, RC, STEP_COLOURS, STEP_MARKS, new_figure
+from paper_figures.style import COLUMN, GUIDE, RC, STEP_COLOURS, STEP_MARKS, new_figure, whiskers
 
 TABLES = {
     "forecasts": (
@@ -31,11 +30,11 @@ def draw(forecasts: pd.DataFrame) -> Figure:
     axes.plot([0, 100], [0, 100], color=GUIDE, linewidth=0.7, linestyle="--", zorder=0)
     for place, (kind, label) in enumerate(KINDS.items()):
         bins = forecasts[(forecasts["map"] == kind) & (forecasts["count"] >= FEW)]
-        errors = np.array([bins["crossed"] - bins["low"], bins["high"] - bins["crossed"]])
+        lengths = whiskers(bins["crossed"], bins["low"], bins["high"])
         axes.errorbar(
             100 * bins["forecast"],
             100 * bins["crossed"],
-            yerr=100 * np.maximum(errors, 0),
+            yerr=100 * lengths,
             color=STEP_COLOURS[2 - 2 * place],
             marker=STEP_MARKS[place],
             markersize=3,

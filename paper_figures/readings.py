@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from paper_figures.rows import PAPER, Unsuited
-from paper_figures.style import GUIDE, PAGE, RC, STEP_COLOURS, new_figure
+from paper_figures.style import GUIDE, PAGE, RC, STEP_COLOURS, new_figure, whiskers
 
 _KEYS = ("truth", "case")
 TABLES = {
@@ -119,7 +119,7 @@ def _draw_readings(axes: Axes, rows: pd.DataFrame, x: pd.Series) -> None:
         axes.errorbar(
             place,
             100 * row.top,
-            yerr=[[100 * max(row.top - row.top_low, 0)], [100 * max(row.top_high - row.top, 0)]],
+            yerr=100 * whiskers([row.top], [row.top_low], [row.top_high]),
             elinewidth=0.7,
             linestyle="",
             **style,

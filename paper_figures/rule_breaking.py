@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from paper_figures.rows import Unsuited
-from paper_figures.style import GUIDE, PAGE, RC, STEP_COLOURS, STEP_MARKS, new_figure
+from paper_figures.style import GUIDE, PAGE, RC, STEP_COLOURS, STEP_MARKS, new_figure, whiskers
 
 RATE = "demonstrations.rule_breaking"
 TABLES = {
@@ -68,7 +68,7 @@ def draw(cases: pd.DataFrame, rank_curve: pd.DataFrame) -> Figure:
                     axes.errorbar(
                         100 * curve["rate"] + _ASIDE * (number - 0.5),
                         middle,
-                        yerr=[(middle - low).clip(lower=0), (high - middle).clip(lower=0)],
+                        yerr=whiskers(middle, low, high),
                         color=STEP_COLOURS[2 * number % 4],
                         marker=STEP_MARKS[number],
                         linestyle="--" if number == 0 else "-",

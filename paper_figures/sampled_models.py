@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullFormatter, NullLocator
 
 from paper_figures.rows import Unsuited
-from paper_figures.style import PAGE, RC, mark, new_figure
+from paper_figures.style import PAGE, RC, mark, new_figure, whiskers
 
 _SCORES = ("brier", "brier_low", "brier_high", "log_score", "log_score_low", "log_score_high")
 TABLES = {
@@ -133,8 +133,8 @@ def _draw_curves(axes: Axes, rows: pd.DataFrame, column: str, scale: float) -> N
 def _draw_changes(axes: Axes, rows: pd.DataFrame) -> None:
     """Differences of Phi against the time step."""
     for number, cells, some in _models(rows):
-        low, high = (some["rms"] - some["low"]).clip(0), (some["high"] - some["rms"]).clip(0)
-        axes.errorbar(some["step"], some["rms"], [low, high], **mark(cells, number))
+        lengths = whiskers(some["rms"], some["low"], some["high"])
+        axes.errorbar(some["step"], some["rms"], lengths, **mark(cells, number))
     axes.set_xscale("log")
     axes.set_yscale("log")
     steps = sorted(rows["step"].unique())
@@ -149,9 +149,9 @@ def _draw_scores(axes: Axes, models: pd.DataFrame) -> None:
     """The Brier score of each model's forecasts; the same tasks for all truths and seeds."""
     names = []
     for number, cells, some in _models(models):
-        first = some.iloc[0]
-        low, high = (abs(first["brier"] - first[f"brier_{end}"]) for end in ("low", "high"))
-        axes.errorbar([number], [first["brier"]], [[low], [high]], **mark(cells, number))
+        first = some.iloc[:1]
+        lengths = whiskers(first["brier"], first["brier_low"], first["brier_high"])
+        axes.errorbar([number], first["brier"], lengths, **mark(cells, number))
         names.append(name(cells).replace(" ", "\n"))
     axes.set_xticks(range(len(names)), labels=names)
     axes.set_xlim(-0.5, len(names) - 0.5)

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.report.means import share
-from paper_figures.style import GUIDE, PAGE, RC, STEP_COLOURS, STEP_MARKS, new_figure
+from paper_figures.style import GUIDE, PAGE, RC, STEP_COLOURS, STEP_MARKS, new_figure, whiskers
 
 TABLES = {
     "soft": ("truth", "weight", "demonstrations", "set", "estimate", "lower", "upper", "verdict"),
@@ -86,7 +86,7 @@ def _estimates(axes: plt.Axes, rows: pd.DataFrame, sizes: list[int]) -> None:
         axes.errorbar(
             x,
             median,
-            [(median - low).clip(0), (high - median).clip(0)],
+            whiskers(median, low, high),
             color=STEP_COLOURS[number],
             marker=STEP_MARKS[number],
             linestyle="none",
@@ -116,7 +116,7 @@ def _coverage(axes: plt.Axes, rows: pd.DataFrame) -> None:
             axes.errorbar(
                 x,
                 value,
-                [(value - low).clip(0), (high - value).clip(0)],
+                whiskers(value, low, high),
                 color=STEP_COLOURS[number],
                 marker=STEP_MARKS[number],
                 linestyle="none",

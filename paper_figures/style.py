@@ -11,9 +11,12 @@ import matplotlib
 matplotlib.use("agg")
 
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from experiments.tracking.files import replace_file
+from mlci.spaces import Floats
 
 matplotlib.rcdefaults()  # a user's own matplotlibrc, such as text.usetex, is for other figures
 
@@ -78,6 +81,16 @@ def mark(cells: int, rank: int) -> dict[str, Any]:
         "color": CELL_COLOURS.get(cells, OTHER_COLOURS[spare]),
         "marker": CELL_MARKS.get(cells, OTHER_MARKS[spare]),
     }
+
+
+def whiskers(middle: ArrayLike, low: ArrayLike, high: ArrayLike) -> Floats:
+    """(2, N) lengths of the lines below and above N marks, of intervals from low to high.
+
+    An interval of other samples, or rounded, need not hold its mark: a line on that side has no
+    length.
+    """
+    marks = np.asarray(middle, dtype=float)
+    return np.maximum([marks - np.asarray(low), np.asarray(high) - marks], 0.0)
 
 
 def save(figure: Figure, path: Path, source: str = "") -> Path:

@@ -22,6 +22,7 @@ from paper_figures.style import (
     STEP_COLOURS,
     TRUTH,
     new_figure,
+    whiskers,
 )
 
 TABLES = {
@@ -142,8 +143,7 @@ def _shares(panels: Sequence[plt.Axes], rows: pd.DataFrame) -> None:
             each = rows[(rows["method"] == method) & rows[name].notna()]
             value, low, high = (100 * each[f"{name}{end}"] for end in ("", "_low", "_high"))
             style = {"color": colour, "marker": mark, "label": method}
-            lengths = [(value - low).clip(0), (high - value).clip(0)]
-            axes.errorbar(each["strength"], value, lengths, **style)
+            axes.errorbar(each["strength"], value, whiskers(value, low, high), **style)
         axes.axvline(NOMINAL, color=GUIDE, linewidth=0.6, linestyle=":", zorder=0)
         axes.set_ylim(-3, 103)
         axes.set_title(title)

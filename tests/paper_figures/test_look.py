@@ -20,7 +20,7 @@ from matplotlib.text import Text
 from experiments.config.paths import CHECKOUT
 from paper_figures import hypothesis_map
 from paper_figures.drawing import FIGURES
-from paper_figures.style import CELL_COLOURS, CELL_MARKS, COLUMN, PAGE, save
+from paper_figures.style import CELL_COLOURS, CELL_MARKS, COLUMN, PAGE, save, whiskers
 
 Drawn = Callable[[ModuleType], Figure]
 TablesFor = Callable[[ModuleType], dict[str, pd.DataFrame]]
@@ -100,6 +100,12 @@ def test_curves_differ_in_grey() -> None:
     # Two of them are close, and their marks tell them apart.
     assert luminance[-1] - luminance[0] > 0.25
     assert len(set(CELL_MARKS.values())) == len(CELL_MARKS)
+
+
+def test_an_interval_that_does_not_hold_its_mark_has_no_line_on_that_side() -> None:
+    """As a share of 100 % whose upper end is rounded to a little less."""
+    lengths = whiskers([0.5, 1.0], [0.25, 0.75], [0.625, 1 - 1e-16])
+    np.testing.assert_array_equal(lengths, [[0.25, 0.25], [0.125, 0.0]])
 
 
 def test_a_users_own_matplotlibrc_changes_nothing(tmp_path: Path) -> None:
