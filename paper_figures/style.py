@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from experiments.tracking.files import replace_file
-from mlci.spaces import Floats
 
 matplotlib.rcdefaults()  # a user's own matplotlibrc, such as text.usetex, is for other figures
 
@@ -83,7 +82,7 @@ def mark(cells: int, rank: int) -> dict[str, Any]:
     }
 
 
-def whiskers(middle: ArrayLike, low: ArrayLike, high: ArrayLike) -> Floats:
+def whiskers(middle: ArrayLike, low: ArrayLike, high: ArrayLike) -> np.ndarray:
     """(2, N) lengths of the lines below and above N marks, of intervals from low to high.
 
     An interval of other samples, or rounded, need not hold its mark: a line on that side has no
