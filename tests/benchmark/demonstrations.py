@@ -215,7 +215,7 @@ def _textbook(start: Floats, goal: Floats, u: Floats) -> float:
 
     x, u, cost = roll_out(np.zeros(STEPS), np.zeros((STEPS, 2)), np.zeros((STEPS, 2)), u)
     damping, by_control = 0.0, np.array([0.0, DT])
-    for _ in range(OURS):
+    for _ in range(ITERATIONS):
         slope, bend = 2 * WEIGHT * (x[-1] - goal), 2 * WEIGHT * np.eye(2)
         shift, gain = np.empty(STEPS), np.empty((STEPS, 2))
         for k in reversed(range(STEPS)):
