@@ -21,6 +21,7 @@ from paper_figures.rows import ACTIONS, SAMPLES
 COMMANDS = {
     "benchmark": "make benchmark",
     "dimensions": "python -m tests.benchmark.dimensions",
+    "shortest_ways": "python -m tests.benchmark.shortest_ways",
 }
 
 # What is read of a study's listing.

@@ -13,8 +13,9 @@ ellipses that it enters. The area with the largest expected overlap is scored; w
 whether two runs agree, shows whether the posterior can be believed.
 
 Tables of results/shortest_ways: `costs`, a row a kept demonstration of the study; `overlaps`, a row
-a set of tasks: `overlap`, what was `expected`, and `alike`, the overlap of the areas of two runs.
-`--results DIR` names another folder of results.
+a set of tasks: `overlap`, what was `expected`, and `alike`, the overlap of the areas of two runs;
+`summary`, means of the latter with Student's 95 % interval over seeds, and quantiles of cost by
+least. `--results DIR` names another folder of results.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 
+from experiments.field.leaderboard import interval
 from experiments.point.trials import demonstrations
 from experiments.tracking.files import csv_bytes, digest, replace_file
 from experiments.tracking.store import Store
@@ -287,6 +289,19 @@ def _world(seed, steps):
     return costs, overlaps
 
 
+def _summary(costs, overlaps):
+    """Means over seeds by number of demonstrations; quantiles of the ratio have no interval."""
+    rows = []
+    for size, some in overlaps.groupby("demonstrations"):
+        for measure in ("overlap", "expected", "alike"):
+            of_seeds = some.groupby("seed")[measure].mean().to_numpy()
+            rows.append({"measure": measure, "demonstrations": size, **interval(of_seeds)})
+    ratio = costs["cost"] / costs["least"]
+    for share in (0.1, 0.5, 0.9):
+        rows.append({"measure": f"ratio_{share:g}", "mean": ratio.quantile(share)})
+    return pd.DataFrame(rows).rename(columns={"lower": "low", "upper": "high"})
+
+
 def main() -> None:
     """Write both tables, and print what they say."""
     parser = argparse.ArgumentParser(prog="shortest_ways", description=__doc__)
@@ -296,11 +311,10 @@ def main() -> None:
     given = parser.parse_args()
     rows = Parallel(n_jobs=-1)(delayed(_world)(seed, given.steps) for seed in given.seeds)
     costs, overlaps = (pd.DataFrame([row for each in rows for row in each[i]]) for i in (0, 1))
-    ratio = (costs["cost"] / costs["least"]).quantile([0.1, 0.5, 0.9]).round(3)
-    print(f"cost / least, 10th, 50th and 90th percentile: {ratio.tolist()}")
-    print(overlaps.groupby("demonstrations")[["overlap", "expected", "alike"]].mean().round(3))
+    summary = _summary(costs, overlaps)
+    print(summary.to_string(index=False))
     folder, written = given.results / "shortest_ways", {}
-    for name, table in (("costs", costs), ("overlaps", overlaps)):
+    for name, table in (("costs", costs), ("overlaps", overlaps), ("summary", summary)):
         content = csv_bytes(table.round(6))
         replace_file(folder / "tables" / f"{name}.csv", content)
         written[f"{name}.csv"] = digest(content)

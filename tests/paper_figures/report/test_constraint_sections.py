@@ -177,6 +177,25 @@ def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
     assert "shapes" not in text
 
 
+def test_areas_are_told_from_outside_where_that_was_measured(tmp_path: Path) -> None:
+    folder = results(tmp_path, "areas", {"area_curve": area_curve()})
+    text = section_areas.section(folder)
+    assert "`python -m tests.benchmark.shortest_ways` makes it." in text
+    rows = [
+        {"measure": name, "demonstrations": size, "mean": value, "low": value - 0.1, "high": 0.9}
+        for size, of_size in ((4, (0.4, 0.5)), (8, (0.6, 0.7)))
+        for name, value in zip(("overlap", "expected"), of_size, strict=True)
+    ]
+    rows += [{"measure": f"ratio_{q}", "mean": 1 + q} for q in (0.1, 0.5, 0.9)]
+    summary = pd.DataFrame(rows)
+    outside = results(tmp_path, "shortest_ways", {"summary": summary})
+    text = section_areas.section(outside)
+    assert "spend 1.50 times as much in the median, 1.10 at the 10th percentile and 1.90" in text
+    assert (
+        "with 4 tasks 0.40 [0.30, 0.90], expecting 0.50, and with 8 tasks 0.60 [0.50, 0.90]" in text
+    )
+
+
 def test_what_five_chosen_tasks_do_for_claim_6(tmp_path: Path) -> None:
     tables = early_overlap_tables()
     text = chosen_tasks(results(tmp_path / "with", "next_task_telescope", tables))
