@@ -154,14 +154,14 @@ class Regions:
         Raises:
             ValueError: a region that knows no distance, such as a predicate without a steepness.
         """
-        nowhere = np.full(np.shape(states)[:-1], np.inf)
+        states = self.space.as_states(states)
+        nowhere = np.full(states.shape[:-1], np.inf)
         for name, shape in zip(self.names, self.shapes, strict=True):
             if shape is not None and not shape.has_distance:
                 raise ValueError(
                     f"region {name} knows what is inside, but not how far away it is, which a safe "
                     "set needs: give its `steepness`"
                 )
-        states = np.asarray(states, dtype=float)
         each = [self.shape(i).level(self.space, states) for i in range(len(self))]
         return np.min([nowhere, *each], axis=0)
 
@@ -210,7 +210,7 @@ class Regions:
         Consecutive samples are joined by a straight line, the short way round in periodic
         dimensions, so the path need not be unwrapped. A path of one sample is a point.
         """
-        paths = np.asarray(paths, dtype=float)
+        paths = self.space.as_states(paths)
         batch = paths.shape[:-2]
         if paths.shape[-2] == 1:
             paths = np.repeat(paths, 2, axis=-2)

@@ -113,9 +113,23 @@ class StateSpace:
         """Whether any dimension does."""
         return bool(np.any(self.periodic))
 
+    def as_states(self, states: ArrayLike) -> Floats:
+        """The same states (..., n), as an array.
+
+        Raises:
+            ValueError: their last axis has not n entries.
+        """
+        array = np.asarray(states, dtype=float)
+        if array.shape[-1:] != (self.dimension,):
+            raise ValueError(
+                f"states of {', '.join(self.names)} have a last axis of {self.dimension}, not an "
+                f"array of shape {array.shape}"
+            )
+        return array
+
     def wrap(self, states: ArrayLike) -> Floats:
         """states (..., n) with periodic dimensions brought into [lower, upper)."""
-        states = np.asarray(states, dtype=float)
+        states = self.as_states(states)
         if not self._wraps:
             return states
         turns = np.floor((states - self.bounds.lower) / self.bounds.widths)
@@ -133,7 +147,7 @@ class StateSpace:
 
     def unwrap(self, path: ArrayLike) -> Floats:
         """A path (..., K+1, n) without jumps: each sample the short way from the one before."""
-        path = np.asarray(path, dtype=float)
+        path = self.as_states(path)
         steps = path[..., 1:, :] - path[..., :-1, :]
         turns = np.ceil(steps / self.bounds.widths - 0.5) * self._period
         turns = np.concatenate([np.zeros_like(path[..., :1, :]), turns], axis=-2)
@@ -141,7 +155,7 @@ class StateSpace:
 
     def contains(self, states: ArrayLike) -> Bools:
         """Whether states (..., n) lie in the bounds; periodic dimensions take any finite value."""
-        states = np.asarray(states)
+        states = self.as_states(states)
         inside: Bools = np.asarray(True)
         # One dimension after the other: numpy is slow along so short an axis.
         for d, (lower, upper) in enumerate(zip(self.bounds.lower, self.bounds.upper, strict=True)):
@@ -169,7 +183,7 @@ class StateSpace:
         Euclidean in the raw units of the state, the short way round in periodic dimensions. A
         free (infinite) dimension of the region, and a periodic one that it covers, do not count.
         """
-        states = np.asarray(states, dtype=float)
+        states = self.as_states(states)
         middle, half = middle_and_half(region)
         counts = np.isfinite(half) & ~(self.periodic & (2 * half >= self.bounds.widths))
         if not np.any(counts):

@@ -22,6 +22,7 @@ import numpy as np
 
 from mlci.spaces import Bools, Floats, Ints
 from mlci.worlds.tables import Table, TablePath
+from mlci.worlds.transitions import check_steps, in_range
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,8 @@ class Agent:
         final: (G,) states in which it has to be after T moves, or the goals before; None for any.
 
     Raises:
-        ValueError: a horizon below 1, or a discount outside (0, 1].
+        ValueError: a horizon that is not whole or below 1, a discount outside (0, 1], or final
+            states that do not exist.
     """
 
     table: Table
@@ -44,11 +46,11 @@ class Agent:
     final: Ints | None = None
 
     def __post_init__(self) -> None:
-        if self.steps < 1 or not 0 < self.discount <= 1:
-            raise ValueError(
-                f"an agent needs a step and a discount in (0, 1], not {self.steps} and "
-                f"{self.discount}"
-            )
+        check_steps(self.steps, "an agent")
+        if not 0 < self.discount <= 1:
+            raise ValueError(f"an agent needs a discount in (0, 1], not {self.discount}")
+        if self.final is not None:
+            in_range(self.final, self.table.states, "final states")
 
     def under(self, mask: Bools) -> Agent:
         """The same agent under constraints, a mask (C,) of regions."""

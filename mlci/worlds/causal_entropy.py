@@ -24,6 +24,7 @@ import scipy  # loads scipy.special and scipy.sparse when they are first used
 from mlci.spaces import Bools, Floats, Ints
 from mlci.worlds.flows import fixed_point, reached
 from mlci.worlds.tables import Table, TablePath
+from mlci.worlds.transitions import check_steps
 
 _IMPROVEMENTS = 100  # of the policy; a dozen do, unless values grow without end
 _CLOSE = 1e-9  # relative change of the values; the error that is left is about its square
@@ -47,8 +48,8 @@ class CausalEntropy:
     discount: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.steps is not None and self.steps < 1:
-            raise ValueError(f"a horizon needs at least one step, not {self.steps}")
+        if self.steps is not None:
+            check_steps(self.steps, "a horizon")
         if not 0 < self.discount <= 1:
             raise ValueError(f"a discount must lie in (0, 1], not {self.discount}")
 

@@ -17,6 +17,7 @@ from mlci.merged_moves import MergedMoves, run_begins
 from mlci.recursions import Leg, backward_pass, reachable_cells
 from mlci.spaces import Bools, Floats, Ints
 from mlci.worlds.tables import Table
+from mlci.worlds.transitions import check_steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +36,7 @@ class FixedHorizon:
     steps: int
 
     def __post_init__(self) -> None:
-        if self.steps < 1:
-            raise ValueError(f"a trajectory needs at least one step, not {self.steps}")
+        check_steps(self.steps, "a trajectory")
 
     @cached_property
     def log_z(self) -> Floats:

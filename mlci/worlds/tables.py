@@ -128,7 +128,8 @@ class Table:
                 f"rewards over temperature must lie within {_LARGEST_REWARD:g} nat, so that their "
                 f"sums keep their digits; one is {rewards[there][~fine][0]:g}"
             )
-        ends = in_range(np.atleast_1d(np.asarray(goals, dtype=np.int64)), states, "goals")
+        listed = list(goals) if isinstance(goals, Iterable) else [goals]
+        ends = in_range(listed, states, "goals")
         there[ends] = False
         named = dict(regions or {})
         return cls(
@@ -234,7 +235,7 @@ def _distribution(start: int | ArrayLike, states: int) -> Floats:
     array = np.asarray(start)
     if array.ndim == 0:
         begins = np.zeros(states)
-        begins[in_range(np.array([int(array)]), states, "the start")] = 1.0
+        begins[in_range(array, states, "the start")] = 1.0
         return begins
     begins = array.astype(float)
     total = float(np.sum(begins))
@@ -254,11 +255,12 @@ def _crossings(
     actions = chances.shape[0] // states
     inside = _incidence([region.states for region in regions], states, "states of a region")
     by = _incidence([region.actions for region in regions], actions, "actions of a region")
-    pairs = [np.array(region.moves, dtype=np.int64).reshape(-1, 2) for region in regions]
-    for pair in pairs:
-        in_range(pair[:, 0], states, "states of a region")
-        in_range(pair[:, 1], actions, "actions of a region")
-    rows = [pair[:, 0] * actions + pair[:, 1] for pair in pairs]
+    pairs = [np.array(region.moves).reshape(-1, 2) for region in regions]
+    rows = [
+        in_range(pair[:, 0], states, "states of a region") * actions
+        + in_range(pair[:, 1], actions, "actions of a region")
+        for pair in pairs
+    ]
     alone = _incidence(rows, chances.shape[0], "moves of a region")
     state, action = np.divmod(np.arange(chances.shape[0]), actions)
     belongs = inside[state] + chances @ inside + by[action] + alone
@@ -267,7 +269,7 @@ def _crossings(
 
 def _incidence(members: Sequence[ArrayLike], count: int, what: str) -> scipy.sparse.csr_matrix:
     """(count, C) with a 1 for each of the numbers that C lists hold."""
-    lists = [in_range(np.unique(np.asarray(each, dtype=np.int64)), count, what) for each in members]
+    lists = [np.unique(in_range(each, count, what)) for each in members]
     column = np.repeat(np.arange(len(lists)), [len(each) for each in lists])
     row = np.concatenate([*lists, np.empty(0, dtype=np.int64)])
     return scipy.sparse.csr_matrix((np.ones(len(row)), (row, column)), shape=(count, len(lists)))

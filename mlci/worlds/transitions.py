@@ -79,13 +79,27 @@ def _certain(successor: Ints) -> scipy.sparse.csr_matrix:
     return scipy.sparse.csr_matrix((np.ones(begins[-1]), flat[there], begins), shape=shape)
 
 
-def in_range(numbers: Ints, count: int, what: str) -> Ints:
-    """The same numbers.
+def in_range(numbers: ArrayLike, count: int, what: str) -> Ints:
+    """The same numbers, as an array.
 
     Raises:
-        ValueError: one that is negative, or as large as the count; `what` names them.
+        ValueError: one that is not whole, negative, or as large as the count; `what` names them.
     """
-    if numbers.size and not (numbers.min() >= 0 and numbers.max() < count):
-        odd = numbers[(numbers < 0) | (numbers >= count)].ravel()[0]
+    given = np.asarray(numbers)
+    if not given.size:
+        return given.astype(np.int64)
+    with np.errstate(invalid="ignore"):  # nan and inf are seen below
+        array = given.astype(np.int64) if given.dtype.kind in "iuf" else np.zeros_like(given, int)
+    if given.dtype.kind not in "iuf" or not np.all(fine := array == given):
+        odd = given.ravel()[0] if given.dtype.kind not in "iuf" else given[~fine].ravel()[0]
+        raise ValueError(f"{what} must be whole numbers from 0 to {count - 1}, not {odd}")
+    if not (array.min() >= 0 and array.max() < count):
+        odd = array[(array < 0) | (array >= count)].ravel()[0]
         raise ValueError(f"{what} must be from 0 to {count - 1}, not {odd}")
-    return numbers
+    return array
+
+
+def check_steps(steps: int, who: str) -> None:
+    """Raise ValueError unless a number of steps is whole and at least 1; `who` needs them."""
+    if not isinstance(steps, int | np.integer) or steps < 1:
+        raise ValueError(f"{who} needs a whole number of steps, at least one, not {steps}")

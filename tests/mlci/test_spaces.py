@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mlci.grids import Grid
+from mlci.regions import Regions
 from mlci.spaces import Box, StateSpace
 
 TURN = 2 * np.pi
@@ -190,3 +192,15 @@ def test_a_region_bounded_at_one_end_only_is_refused():
     for measure in (CYLINDER.excess, CYLINDER.signed_distance):
         with pytest.raises(ValueError, match="bounded at both ends or at neither"):
             measure([0.0, 0.0], box)
+
+
+def test_states_of_another_space_are_refused_wherever_they_come_in() -> None:
+    """Broadcasting would make sense of them, and answer for other states."""
+    space = StateSpace(Box([0, 0], [1, 1]), [True, False], ("angle", "rate"))
+    boxes = Regions.from_boxes(space, [Box([0.2, 0.2], [0.4, 0.4])])
+    message = r"angle, rate have a last axis of 2, not an array of shape \(5, 3\)"
+    for ask in (space.wrap, space.unwrap, space.contains, boxes.violated_by, boxes.signed_distance):
+        with pytest.raises(ValueError, match=message):
+            ask(np.zeros((5, 3)))
+    with pytest.raises(ValueError, match=r"not an array of shape \(1,\)"):
+        Grid(space, (3, 3)).index([0.5])

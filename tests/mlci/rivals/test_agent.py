@@ -90,5 +90,5 @@ def test_no_way_is_told() -> None:
     assert not agent.is_possible
     with pytest.raises(ValueError, match="no way from its start"):
         agent.sample(1, np.random.default_rng(0))
-    with pytest.raises(ValueError, match="a step and a discount"):
-        Agent(table, 0)
+    with pytest.raises(ValueError, match=r"a discount in \(0, 1\], not 0"):
+        Agent(table, 2, discount=0)

@@ -145,7 +145,7 @@ def test_probability_of_a_path_is_that_of_its_actions() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"steps": 0}, "a horizon needs at least one step, not 0"),
+        ({"steps": 0}, "a horizon needs a whole number of steps, at least one, not 0"),
         ({"discount": 0.0}, r"a discount must lie in \(0, 1\], not 0.0"),
         ({"discount": 1.1}, r"a discount must lie in \(0, 1\], not 1.1"),
     ],

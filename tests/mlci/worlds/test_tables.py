@@ -9,6 +9,9 @@ import pytest
 from scipy import sparse
 from toy_tables import chancy_world, grid_world, published_grid
 
+from mlci.rivals.agent import Agent
+from mlci.worlds.causal_entropy import CausalEntropy
+from mlci.worlds.fixed_horizon import FixedHorizon
 from mlci.worlds.tables import Table, TablePath, TableRegion
 
 # Three states in a row, actions left and right; the last one is the goal.
@@ -182,3 +185,31 @@ def test_a_name_that_no_region_has_is_refused() -> None:
 
 def test_moves_end_at_the_edge_of_the_grid() -> None:
     assert np.sum(grid_world(3, goal=8).successor >= 0) == 4 * 3 + 4 * 5 + 8
+
+
+@pytest.mark.parametrize(
+    ("start", "goals", "message"),
+    [
+        (0.5, (), "the start must be whole numbers from 0 to 1, not 0.5"),
+        (float("nan"), (), "the start must be whole numbers from 0 to 1, not nan"),
+        (True, (), "the start must be whole numbers from 0 to 1, not True"),
+        (0, [0.5], "goals must be whole numbers from 0 to 1, not 0.5"),
+        (0, [True, False], "goals must be whole numbers from 0 to 1, not True"),
+        (0, 2, "goals must be from 0 to 1, not 2"),
+    ],
+)
+def test_numbers_of_states_are_whole(start: object, goals: object, message: str) -> None:
+    """A mask, or a share of the way between two states, names no state."""
+    with pytest.raises(ValueError, match=message):
+        Table.from_arrays([[1], [0]], 0.0, start, goals)
+    assert Table.from_arrays([[1], [0]], 0.0, 1.0, {1.0}).goals.tolist() == [1]
+
+
+@pytest.mark.parametrize("steps", [2.5, float("nan"), 0])
+def test_numbers_of_steps_are_whole(steps: object) -> None:
+    table = Table.from_arrays([[1], [0]], 0.0, 0)
+    for world in (FixedHorizon, CausalEntropy, Agent):
+        with pytest.raises(ValueError, match=f"a whole number of steps, at least one, not {steps}"):
+            world(table, steps)
+    with pytest.raises(ValueError, match="final states must be from 0 to 1, not 7"):
+        Agent(table, 2, final=np.array([7]))
