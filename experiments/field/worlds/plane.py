@@ -40,7 +40,7 @@ NOISE, CLEARANCE = 0.15, 0.04  # deviation of a velocity as a share of it, [m] k
 def between(truth: Regions, seed: int, count: int) -> Case:
     """Optimal paths, of tasks whose straight way would enter what is forbidden."""
     safe = solve_safe_set(POINT, Grid(POINT.space, (61, 61)), truth)
-    keep_out = SafetyFilter(POINT, safe, 0.05, 0.04, 0.15)
+    keep_out = SafetyFilter(POINT, safe, 0.05, 0.04, 0.05)  # a wide blend makes paths zigzag
     kept: list[Demonstration] = []
     tried = dropped = 0
     while len(kept) < count:
@@ -54,10 +54,11 @@ def between(truth: Regions, seed: int, count: int) -> Case:
             dt=0.05,
             first=tried,
             margin=0.04,
+            restarts=12,
         )
         tried += len(trials)
-        if through := crossing(POINT, trials, truth, dt=0.05, iterations=30):
-            tries = demonstrate(POINT, through, truth, keep_out, dt=0.05, iterations=30)
+        if through := crossing(POINT, trials, truth, dt=0.05, iterations=100):
+            tries = demonstrate(POINT, through, truth, keep_out, dt=0.05, iterations=100)
             kept += [each.demonstration for each in tries if each.outcome is Outcome.KEPT]
             dropped += sum(each.outcome is not Outcome.KEPT for each in tries)
     cells = Cells(POINT, truth, (24, 24), 7, 0.5, (12, 12), temperature=0.1)
