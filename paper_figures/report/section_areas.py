@@ -76,12 +76,28 @@ def _shapes(curve: pd.DataFrame) -> str:
         "others is exact for the drawn ones, and the answer is the area whose *expected* overlap "
         "is largest, which is neither the most probable pair nor all that is rather forbidden than "
         f"not. With {SHOWN} demonstrations it reaches {overlap}, against {climb} of squares, and "
-        f"expects {number(at.loc['shapes', 'expected'], 2)}. What could be reached? The regions of "
-        f"the truth that lie in the way of one of {SHOWN} tasks overlap all of it by {shown}: "
+        f"expects {number(at.loc['shapes', 'expected'], 2)}{_hope(curve)}. "
+        "What could be reached? The regions of the "
+        f"truth that lie in the way of one of {SHOWN} tasks overlap all of it by {shown}: "
         "nobody shows anything of the others. Where the truth is two ellipses of the prior and "
         f"the tabular model itself demonstrates, so that all that is assumed is right, the same "
         f"inference reaches {ideal}: that much is left open by so few detours.\n\n"
         f"{_chosen(at)}"
+    )
+
+
+def _hope(curve: pd.DataFrame) -> str:
+    """What is reached and expected with the most demonstrations, and which of the two is more."""
+    shapes = curve[curve["method"] == "shapes"].set_index("demonstrations")
+    most, last = int(shapes.index.max()), shapes.loc[shapes.index.max()]
+    if most == SHOWN:
+        return ""
+    verdict = "too hopeful" if last["expected"] > last["iou_high"] else "as it comes out"
+    if last["expected"] < last["iou_low"]:
+        verdict = "too careful"
+    return (
+        f", with {most} it reaches {number(last['iou'], 2)} and expects "
+        f"{number(last['expected'], 2)}, which is {verdict}"
     )
 
 

@@ -163,7 +163,7 @@ def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
     text = section_areas.section(results(tmp_path / "with", "areas", {"area_curve": area_curve()}))
     # 0.1 + 0.1 k + 0.2 after four demonstrations, of the fourth, sixth, seventh and eighth method.
     assert "With 4 demonstrations it reaches 0.80 [0.75, 0.85], against 0.60 of squares" in text
-    assert "and expects 0.50" in text
+    assert "and expects 0.50. What could" in text
     assert "overlap all of it by 1.0 [0.95, 1.1]" in text
     assert "the same inference reaches 0.90 [0.85, 0.95]" in text
     assert "4 chosen tasks reach 1.1 [1.1, 1.2], more than 0.80 [0.75, 0.85] of random" in text
@@ -175,6 +175,20 @@ def test_areas_of_shapes_and_their_ceilings(tmp_path: Path) -> None:
     cells = area_curve().query("method in ['single', 'greedy', 'climb']").drop(columns="expected")
     text = section_areas.section(results(tmp_path / "without", "areas", {"area_curve": cells}))
     assert "shapes" not in text
+
+
+@pytest.mark.parametrize(
+    ("reached", "verdict"),
+    [(0.3, "too hopeful"), (0.48, "as it comes out"), (0.9, "too careful")],
+)
+def test_whether_expected_overlaps_come_out(tmp_path: Path, reached: float, verdict: str) -> None:
+    curve = area_curve()
+    ends = {"iou": reached, "iou_low": reached - 0.05, "iou_high": reached + 0.05}
+    more = curve[curve["demonstrations"] == 4].assign(demonstrations=8, **ends)
+    text = section_areas.section(
+        results(tmp_path, "areas", {"area_curve": pd.concat([curve, more])})
+    )
+    assert f"with 8 it reaches {reached:.2f} and expects 0.50, which is {verdict}. What" in text
 
 
 def test_areas_are_told_from_outside_where_that_was_measured(tmp_path: Path) -> None:
