@@ -120,7 +120,7 @@ def shortest(start, goal, ellipses, count):
 
 
 @njit
-def _length(way):
+def length(way):
     total = 0.0 if len(way) else np.inf
     for k in range(len(way) - 1):
         total += _distance(way[k], way[k + 1])
@@ -138,7 +138,7 @@ def _log_likelihood(ellipses, ways, costs, duration):
                 return -np.inf
     total = 0.0
     for j in range(len(ways)):
-        least = _length(shortest(ways[j, 0], ways[j, -1], ellipses, _COARSE)) ** 2 / duration
+        least = length(shortest(ways[j, 0], ways[j, -1], ellipses, _COARSE)) ** 2 / duration
         total += min(0.0, (least - costs[j]) / TEMPERATURE)
     return total
 
@@ -240,7 +240,7 @@ def _inside(points, ellipses):
 
 def overlap(seed, subset, ways, truth, duration, steps):
     """A row of `overlaps`: what ways (N, 101, 2) of least cost tell of two ellipses."""
-    costs = np.array([_length(way) ** 2 / duration for way in ways])
+    costs = np.array([length(way) ** 2 / duration for way in ways])
     side = HALF * (2 * np.arange(_SIDE) + 1 - _SIDE) / _SIDE
     points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     drawn = []
@@ -278,7 +278,7 @@ def _world(seed, steps):
         each = trials.demonstration(number, duration, settings.demonstrations.dt)
         spent = np.sum(each.controls**2) * duration / len(each.controls)
         way = shortest(each.states[0], each.states[-1], truth, _FINE)
-        least = _length(way) ** 2 / duration
+        least = length(way) ** 2 / duration
         costs.append({"seed": seed, "demonstration": number, "cost": spent, "least": least})
         ways.append(_dense(way))
     overlaps = []
