@@ -124,8 +124,8 @@ def _from_outside(results: Results) -> str:
         "round ellipses it is found exactly. The demonstrators spend "
         f"{middle} times as much in the median, {low} at the 10th percentile and {high} at the "
         "90th. If somebody went the shortest ways, the posterior of two ellipses by what these "
-        f"cost, without cells, would reach with {', and with '.join(told)}. That much is in so "
-        "many detours, however they are read.\n\n"
+        f"cost, without cells, would reach with {', and with '.join(told)}. What it expects is "
+        "what so many detours tell on average over the prior, what it reaches is of this truth.\n\n"
     )
 
 

@@ -190,21 +190,23 @@ def _moved(rng, ellipses):
 
 @njit
 def sample(rng, steps, ways, costs, duration):
-    """Ellipses (KEPT, 2, 4) of the last half of the chain that is cold, and log likelihoods.
+    """Ellipses (KEPT, 2, 4) of the last half of the chain that is cold.
 
-    Parallel tempering: a chain each temperature, which start at the best of many draws, and of
-    which neighbours exchange their states.
+    Parallel tempering: a chain each temperature, which start at the best of many draws, of which
+    at least one is possible, and of which neighbours exchange their states.
     """
     count = len(COLD)
     here, value = np.empty((count, 2, 4)), np.full(count, -np.inf)
-    for _ in range(3000):
+    tries = 0
+    while tries < 3000 or value[0] == -np.inf:
+        tries += 1
         new = np.empty((2, 4))
         _draw(rng, new[0])
         _draw(rng, new[1])
         found = _log_likelihood(new, ways, costs, duration) if _possible(new) else -np.inf
         if found > value[0]:
             value[:], here[:] = found, new
-    kept, values = np.empty((KEPT, 2, 4)), np.empty(KEPT)
+    kept = np.empty((KEPT, 2, 4))
     for step in range(steps):
         for c in range(count):
             new = _moved(rng, here[c])
@@ -221,8 +223,8 @@ def sample(rng, steps, ways, costs, duration):
             here[c + 1], value[c + 1] = swapped, worth
         k = (2 * step - steps) * KEPT // steps
         if k >= 0:
-            kept[k], values[k] = here[0], value[0]
-    return kept, values
+            kept[k] = here[0]
+    return kept
 
 
 def _dense(way):
@@ -246,19 +248,22 @@ def overlap(seed, subset, ways, truth, duration, steps):
     drawn = []
     for run in range(RUNS):
         rng = np.random.default_rng([seed, subset, run])
-        drawn.append(
-            [_inside(points, each) for each in sample(rng, steps, ways, costs, duration)[0]]
-        )
+        drawn.append([_inside(points, each) for each in sample(rng, steps, ways, costs, duration)])
     area, expected = _named(np.concatenate(drawn))
     true, (one, other) = _inside(points, truth), (_named(np.array(draws))[0] for draws in drawn)
     return {
         "seed": seed,
         "subset": subset,
         "demonstrations": len(ways),
-        "overlap": np.sum(area & true) / np.sum(area | true),
+        "overlap": _shared(area, true),
         "expected": expected,
-        "alike": np.sum(one & other) / np.sum(one | other),
+        "alike": _shared(one, other),
     }
+
+
+def _shared(one, other):
+    """Intersection over union of two areas."""
+    return np.sum(one & other) / np.sum(one | other)
 
 
 def _named(draws):
@@ -310,6 +315,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, help="of each chain")
     parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS))
     given = parser.parse_args()
+    if given.steps is not None and given.steps < 2 * KEPT:
+        parser.error(f"a chain keeps {KEPT} of its last half: at least {2 * KEPT} steps")
     rows = Parallel(n_jobs=-1)(delayed(_world)(seed, given.steps) for seed in given.seeds)
     costs, overlaps = (pd.DataFrame([row for each in rows for row in each[i]]) for i in (0, 1))
     summary = _summary(costs, overlaps)

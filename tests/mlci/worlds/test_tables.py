@@ -213,3 +213,11 @@ def test_numbers_of_steps_are_whole(steps: object) -> None:
             world(table, steps)
     with pytest.raises(ValueError, match="final states must be from 0 to 1, not 7"):
         Agent(table, 2, final=np.array([7]))
+
+
+def test_a_region_of_moves_holds_these_and_no_others() -> None:
+    """Rows are s * A + a; three states in a row, and of the middle one the way back."""
+    table = Table.from_arrays(
+        [[0, 1], [0, 2], [1, 2]], 0.0, 0, regions={"back": TableRegion(moves=[(1, 0), (2, 1)])}
+    )
+    assert np.flatnonzero(table.crosses.toarray()[:, 0]).tolist() == [2, 5]
